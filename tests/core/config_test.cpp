@@ -232,7 +232,7 @@ TEST_CASE("unknown keys are told with the nearest one, the section they belong i
   CHECK_THAT(fault(R"({"shair": 1})"), Equals("a.json:1: /shair: unknown key; did you mean \"share\"?"));
   CHECK_THAT(fault(R"({"count": 1})"),
              Equals("a.json:1: /count: unknown key; it belongs in /inner, /free/NAME, /known/one, "
-                    "/known/two or /list/N"));
+                    "/known/two or /list/0"));
   CHECK_THAT(fault(R"({"inner": {"count": 1, "colour": "red"}})"),
              Equals("a.json:1: /inner/colour: unknown key; it belongs at the top level"));
   CHECK_THAT(fault(R"({"inner": {"count": 1, "qqq": 1}})"),
