@@ -7,6 +7,7 @@
 #include <fstream>
 #include <list>
 #include <optional>
+#include <set>
 #include <thread>
 #include <unistd.h>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "core/observer.h"
 #include "core/process.h"
 #include "core/text.h"
+#include "pipelines/sweep/halving.h"
 
 namespace hsi4d {
 namespace {
@@ -75,7 +77,8 @@ class Launcher {
         launch_(launch),
         frozen_plan_(paths.frozen_plan(plan)),
         jobs_(static_cast<std::size_t>(sweep_jobs(plan, launch))),
-        begin_(Clock::now()) {}
+        begin_(Clock::now()),
+        turns_(plan, done_metrics(paths, plan)) {}
 
   SweepOutcome run() {
     for (const std::size_t index : distinct_runs(plan_)) {
@@ -87,6 +90,7 @@ class Launcher {
       }
       learn_from(read_attempts(paths_, id_of(index)));
     }
+    for (const std::size_t index : waiting_) open_.insert(id_of(index));
     if (outcome_.done_before > 0)
       tell(std::to_string(outcome_.done_before) + " of " + std::to_string(total_) + " runs are done already");
     try {
@@ -173,7 +177,8 @@ class Launcher {
   }
 
   std::size_t ended() const {
-    return outcome_.done_before + outcome_.computed + outcome_.by_others + outcome_.failures.size();
+    return outcome_.done_before + outcome_.computed + outcome_.by_others + outcome_.failures.size() +
+           outcome_.left_out + outcome_.over_budget;
   }
 
   void report(bool is_finished) {
@@ -202,15 +207,33 @@ class Launcher {
                        [&](const Running& run) { return plan_.runs[run.index].dataset == dataset; });
   }
 
+  /// What is waiting when the hours of the sweep are over is not started any more.
+  bool stops_for_budget() {
+    if (waiting_.empty() || running_.size() >= jobs_ || !is_over_budget(paths_, plan_)) return false;
+    outcome_.over_budget += waiting_.size();
+    tell("the sweep's " + number_text(plan_.hours) + " h are spent: " + std::to_string(waiting_.size()) +
+         (waiting_.size() == 1 ? " run is" : " runs are") + " not started");
+    waiting_.clear();
+    return true;
+  }
+
   void start_what_fits() {
     if (running_.size() == running_before_ && Clock::now() < next_try_) return;  // nothing has changed since
     next_try_ = Clock::now() + kBetweenLooks;
+    if (stops_for_budget()) return;
+    const auto may_end = [this](std::size_t run) { return open_.contains(id_of(run)); };
     for (auto it = waiting_.begin(); it != waiting_.end() && running_.size() < jobs_ && has_memory_for_one();) {
       const std::size_t index = *it;
-      if (is_claimed(paths_, id_of(index)) || waits_for_dataset(index)) {
+      const SweepTurn turn = turns_.turn(index, may_end);
+      if (turn == SweepTurn::kNever) {
+        it = waiting_.erase(it);
+        open_.erase(id_of(index));
+        ++outcome_.left_out;
+      } else if (turn == SweepTurn::kLater || is_claimed(paths_, id_of(index)) || waits_for_dataset(index)) {
         ++it;
       } else if (is_sweep_run_whole(paths_, id_of(index))) {  // since we looked
         it = waiting_.erase(it);
+        open_.erase(id_of(index));
         ++outcome_.by_others;
         tell_end(index, "was done by another launcher");
       } else {
@@ -267,6 +290,7 @@ class Launcher {
   }
 
   void note_done(const Running& run, const ProgramEnd& end) {
+    open_.erase(id_of(run.index));
     ++outcome_.computed;
     note_seconds(run.program.seconds());
     tell_end(run.index, "done in " + duration_text(run.program.seconds()) +
@@ -274,6 +298,7 @@ class Launcher {
   }
 
   void add_failure(SweepFailure failure) {
+    open_.erase(id_of(failure.index));
     outcome_.failures.push_back(std::move(failure));
     tell_end(outcome_.failures.back().index, "failed: " + outcome_.failures.back().message);
   }
@@ -353,6 +378,8 @@ class Launcher {
   double last_report_ = 0, known_peak_mb_ = 0, seconds_sum_ = 0;
   std::size_t seconds_count_ = 0;
   std::deque<std::size_t> waiting_;
+  std::set<std::string> open_;  // ids of runs that may still be done
+  SweepTurns turns_;
   std::list<Running> running_;
   SweepOutcome outcome_;
   bool is_stopping_ = false, has_warned_of_memory_ = false;

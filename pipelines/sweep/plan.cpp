@@ -493,20 +493,30 @@ const PlannedSearch* search_of(const SweepPlan& plan, const SweepRun& run) {
 
 std::string short_sweep_key(const std::string& key) { return last_parts(key, 1); }
 
+std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys) {
+  std::vector<std::string> names;
+  for (const std::string& key : keys) {
+    std::size_t count = 1;
+    const auto is_like = [&](const std::string& other) {
+      return other != key && last_parts(other, count) == last_parts(key, count);
+    };
+    while (last_parts(key, count) != key && std::any_of(keys.begin(), keys.end(), is_like)) ++count;
+    names.push_back(last_parts(key, count));
+  }
+  return names;
+}
+
 std::vector<SweepLabelPart> sweep_label_parts(const SweepRun& run) {
   std::vector<SweepLabelPart> parts;
   for (const auto& [axis, name] :
        {std::pair<const char*, std::string>{"block", run.block}, {"clip", run.clip}, {"ablation", run.ablation}}) {
     if (!name.empty()) parts.push_back({axis, name});
   }
-  for (const auto& [key, value] : run.values) {
-    std::size_t count = 1;
-    const auto is_like = [&, own = key](const auto& other) {
-      return other.first != own && last_parts(other.first, count) == last_parts(own, count);
-    };
-    while (last_parts(key, count) != key && std::any_of(run.values.begin(), run.values.end(), is_like)) ++count;
-    parts.push_back({key, last_parts(key, count) + " " + plain_value(value)});
-  }
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : run.values) keys.push_back(key);
+  const std::vector<std::string> names = short_sweep_keys(keys);
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    parts.push_back({keys[i], names[i] + " " + plain_value(run.values[i].second)});
   if (!run.seed.empty()) parts.push_back({"seed", "seed " + run.seed});
   return parts;
 }

@@ -69,6 +69,9 @@ SweepRun without_repetition(SweepRun run);
 /// The last parts of keys that tell them apart: "iterations".
 std::string short_sweep_key(const std::string& key);
 
+/// So many last parts of each key as tell it from the others: "camera.lr", "body_pose.lr", "blur".
+std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys);
+
 /// Puts the combinations of a sweep together and reads each as a run would. Throws one UserError with every problem, of
 /// the file, its configs and its combinations, with the runs that it is in.
 SweepPlan plan_sweep(const std::filesystem::path& file, const std::vector<LossDescription>& losses);

@@ -3,6 +3,7 @@
 
 #include "core/check.h"
 #include "core/json_text.h"
+#include "pipelines/metrics/metric_facts.h"
 #include "pipelines/sweep/plan.h"
 
 namespace hsi4d {
@@ -99,6 +100,8 @@ PlannedSearch search_of_json(const ConfigValue& object, const std::string& in) {
   PlannedSearch search;
   search.block = string_member(object, "block");
   search.metric = member_of(object, "metric", in, Kind::kString).text;
+  if (find_metric_facts(search.metric) == nullptr)
+    fail_at(object, child_pointer(in, "metric"), json_string(search.metric) + " is no metric");
   for (const auto& [key, scale] : words_of(object, "over", in)) search.over.push_back({key, scale == "log"});
   if (find_member(object, "rungs") == nullptr) return search;
   for (const ConfigValue& key : member_of(object, "rungs", in, Kind::kArray).items) {

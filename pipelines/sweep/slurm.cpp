@@ -12,6 +12,7 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "optim/checkpoint.h"
+#include "pipelines/sweep/halving.h"
 
 namespace hsi4d {
 namespace {
@@ -180,9 +181,23 @@ std::string script(const SweepPaths& paths, const std::string& name, const std::
   return file;
 }
 
-/// @param after  another array that has to be over before, "": none
+/// ":ID:ID", as --dependency takes it.
+std::string job_list(const std::set<std::string>& jobs) {
+  std::string text;
+  for (const std::string& job : jobs) text += ":" + job;
+  return text;
+}
+
+/// Runs of the rungs of successive halving, of which each waits for those below; of other sweeps all are of rung 0.
+std::map<std::size_t, std::vector<std::size_t>> by_rung(const SweepPlan& plan, const std::vector<std::size_t>& runs) {
+  std::map<std::size_t, std::vector<std::size_t>> rungs;
+  for (const std::size_t run : runs) rungs[plan.runs[run].rung].push_back(run);
+  return rungs;
+}
+
+/// @param after  other arrays that have to be over before
 std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const ArrayPart& part,
-                         const std::string& program, int jobs, int threads, const std::string& after) {
+                         const std::string& program, int jobs, int threads, const std::set<std::string>& after) {
   const std::string whole = slurm_folder(paths).parent_path().string();
   const ArraySource source = {fs::path(paths.frozen_plan(plan)).filename().string(), part.first};
   const std::string first = std::to_string(part.first);
@@ -191,7 +206,7 @@ std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const A
                                quoted(whole + "/plans/" + source.plan_file) + " \"" + index + "\" --out " +
                                quoted(whole) + " --threads " + std::to_string(threads) + " --requeue";
   std::vector<std::string> options = array_options(paths, plan, part.runs, jobs, threads, part.first);
-  if (!after.empty()) options.push_back("--dependency=afterany:" + after);
+  if (!after.empty()) options.push_back("--dependency=afterany" + job_list(after));
   const std::string name = part.first == 0 ? "run.sh" : "run_from_" + first + ".sh";
   const std::string job = submit(std::move(options), script(paths, name, commands));
   const std::string known = (slurm_folder(paths) / "jobs.txt").string();
@@ -203,10 +218,9 @@ std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const A
 std::string submit_results(const SweepPaths& paths, const SweepPlan& plan, const std::set<std::string>& arrays,
                            const std::string& program) {
   const fs::path folder = slurm_folder(paths);
-  std::string after;
-  for (const std::string& array : arrays) after += ":" + array;
   std::vector<std::string> options = {"--job-name=" + plan.name + "-results",
-                                      "--comment=" + job_comment(folder, kResultsMark), "--dependency=afterany" + after,
+                                      "--comment=" + job_comment(folder, kResultsMark),
+                                      "--dependency=afterany" + job_list(arrays),
                                       "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
   if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);
   options.insert(options.end(), plan.slurm.options.begin(), plan.slurm.options.end());
@@ -279,7 +293,9 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
   const fs::path folder = slurm_folder(paths);
   const QueuedJobs queued = queued_jobs(folder);
   SlurmJobs submitted;
+  const std::vector<SweepRunState> states = sweep_run_states(paths, plan);
   for (const std::size_t index : distinct_runs(plan)) {
+    if (states[index] == SweepRunState::kLeftOut) continue;
     if (is_sweep_run_whole(paths, plan.runs[index].id)) continue;
     if (queued.runs.contains(plan.runs[index].id)) {
       ++submitted.queued;
@@ -288,12 +304,15 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
     }
   }
   std::set<std::string> arrays = queued.arrays;
-  for (const ArrayPart& part : submitted.runs.empty() ? std::vector<ArrayPart>() : array_parts(submitted.runs)) {
-    // The most at once are those of an array: with such a bound the next one waits for the one before.
-    const bool waits = most_at_once(plan, jobs) > 0 && !submitted.arrays.empty();
-    submitted.arrays.push_back(
-        submit_array(paths, plan, part, program, jobs, threads, waits ? submitted.arrays.back() : ""));
-    arrays.insert(submitted.arrays.back());
+  for (const auto& [rung, runs] : by_rung(plan, submitted.runs)) {
+    const std::set<std::string> below = rung > 0 ? arrays : std::set<std::string>();
+    for (const ArrayPart& part : array_parts(runs)) {
+      // The most at once are those of an array: with such a bound the next one waits for the one before.
+      std::set<std::string> after = below;
+      if (most_at_once(plan, jobs) > 0 && !submitted.arrays.empty()) after.insert(submitted.arrays.back());
+      submitted.arrays.push_back(submit_array(paths, plan, part, program, jobs, threads, after));
+      arrays.insert(submitted.arrays.back());
+    }
   }
   const bool has_results_of_all = queued.has_results && submitted.arrays.empty();
   if (!arrays.empty() && !has_results_of_all) submitted.results = submit_results(paths, plan, arrays, program);

@@ -34,8 +34,9 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
 /// Submits the runs of a plan that are neither done nor in the queue already, and the job for the results where none is
 /// in the queue. What is in the queue is told by the comments of its jobs and by jobs.txt, so that nothing is submitted
 /// twice after a kill at any moment. More runs than Slurm takes in an array (MaxArraySize) are several, which wait for
-/// each other where there is a bound to the runs at once. A run is put into the queue again when its time is up (its
-/// state saved before) or its node is lost, and then goes on.
+/// each other where there is a bound to the runs at once; so are the rungs of successive halving, each of which waits
+/// for those below. A run is put into the queue again when its time is up (its state saved before) or its node is lost,
+/// and then goes on.
 /// @param program  hsi4d, at the place where the nodes have it
 /// Throws UserError with what Slurm says.
 SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
