@@ -163,7 +163,9 @@ Area area_of(const Plot& plot, Range xs, Range ys, double top) {
   const auto rows = static_cast<double>(plot.rows.size());
   if (!plot.columns.empty()) area.x.range = {-0.3, static_cast<double>(plot.columns.size()) - 0.7};
   if (!plot.columns.empty()) area.left = kRight;
-  if (has_rows)
+  if (!plot.columns.empty())
+    area.y.range = {0, 1};
+  else if (has_rows)
     area.y.range = {rows - 0.5, -0.5};
   else
     area.y = plot.is_log ? log_axis(ys) : linear_axis(ys, 5, false, true);
@@ -172,8 +174,10 @@ Area area_of(const Plot& plot, Range xs, Range ys, double top) {
   if (has_rows) area.left = std::min(kMostLeft, 14 + kLetter * static_cast<double>(longest));
   area.right = plot.width - kRight;
   area.top = top;
+  if (!plot.columns.empty()) area.top += kLine;
   area.bottom = has_rows ? top + kRowHeight * rows : top + plot.height - kTop - kBottom;
   area.height = area.bottom + kBottom;
+  if (!plot.columns.empty()) area.bottom -= kLine / 2;
   return area;
 }
 
@@ -184,7 +188,7 @@ std::string columns_svg(const Plot& plot, const Area& area) {
   for (std::size_t i = 0; i < plot.columns.size(); ++i) {
     const double x = area.at_x(static_cast<double>(i));
     svg += line_svg("axis", x, area.top, x, area.bottom) +
-           text_svg("row", "middle", x, area.bottom + 16, shortened(plot.columns[i], most));
+           text_svg("row", "middle", x, area.bottom + kBottom, shortened(plot.columns[i], most));
   }
   return svg + "\n";
 }

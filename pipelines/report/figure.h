@@ -30,7 +30,7 @@ struct Plot {
   std::vector<Series> series;
   Legend legend{};                     ///< above the axes
   std::vector<std::string> rows{};     ///< y is not a number but a row, 0 the topmost one; these name them
-  std::vector<std::string> columns{};  ///< x is not a number but a column, each an axis of its own; these name them
+  std::vector<std::string> columns{};  ///< x is a column, an axis of its own with y from 0 to 1; these name them
   bool is_log = false;                 ///< y on a logarithmic scale; points ≤ 0 are left out
   bool is_log_x = false;               ///< x likewise
   std::vector<double> ticks_x{};       ///< of a logarithmic x; empty: round numbers

@@ -22,8 +22,9 @@ using Strings = std::vector<std::string>;
 
 const Strings kBlockKeys = {"name", "base", "set",    "clips", "seeds", "ablations",
                             "grid", "zip",  "search", "skip",  "only"};
-const Strings kFileKeys = {"name", "base",   "set",    "clips",   "seeds",   "ablations", "grid",      "zip",  "skip",
-                           "only", "search", "blocks", "compare", "threads", "hours",     "memory_mb", "slurm"};
+const Strings kFileKeys = {"name",    "base",    "set",   "clips",     "seeds",          "ablations",
+                           "grid",    "zip",     "skip",  "only",      "search",         "blocks",
+                           "compare", "threads", "hours", "memory_mb", "memory_retries", "slurm"};
 
 constexpr ConfigChoice<SweepSampling> kSamplings[] = {{SweepSampling::kSobol, "sobol"},
                                                       {SweepSampling::kRandom, "random"}};
@@ -137,7 +138,7 @@ class Reader {
           json_string(sweep.name) + ", after the file, cannot be the name of a folder; allowed: " + kFileNameText);
     ConfigFields fields;
     describe(fields, sweep);
-    read_config(with_members(tree, {"threads", "hours", "memory_mb", "slurm"}), fields, problems_);
+    read_config(with_members(tree, {"threads", "hours", "memory_mb", "memory_retries", "slurm"}), fields, problems_);
     check_slurm(tree, sweep.slurm);
     if (const ConfigValue* const compare = find_member(tree, "compare")) sweep.compare = settings(*compare, "/compare");
     read_blocks(tree, whole, sweep);
@@ -634,6 +635,8 @@ void describe(ConfigFields& f, SweepFile& s) {
   f.integer("threads", s.threads, {.min = 0, .max = 1024}, "Threads of a run; 0: the cores are shared out");
   f.number("hours", s.hours, {.min = 0}, "What all runs may take, added up: then none is started; 0: no limit");
   f.number("memory_mb", s.memory_mb, {.min = 0}, "What a run takes at most, MB; 0: not known");
+  f.integer("memory_retries", s.memory_retries, {.min = 0, .max = kMostMemoryRetries},
+            "So often a run that is killed for memory is computed again, each time with twice as much");
   f.object("slurm", s.slurm, "How Slurm starts the runs",
            [](ConfigFields& fields, SweepSlurm& slurm) { describe(fields, slurm); });
 }

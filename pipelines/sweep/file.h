@@ -102,6 +102,9 @@ struct SweepSlurm {
 /// The most runs that a sweep's file may ask for, before `skip` and `only` leave some out.
 inline constexpr std::int64_t kMostSweepRuns = 100000;
 
+/// The most retries of a run that is killed for memory: the last one has a thousand times as much.
+inline constexpr int kMostMemoryRetries = 10;
+
 /// A sweep's file, read.
 struct SweepFile {
   std::string name;
@@ -110,6 +113,7 @@ struct SweepFile {
   int threads = 0;                    ///< of each run; 0: not said
   double hours = 0;                   ///< of all runs, added up; 0: no limit
   double memory_mb = 0;               ///< of each run; 0: not said
+  int memory_retries = 0;             ///< of a run that is killed for memory, each with twice as much
   SweepSlurm slurm;
 };
 

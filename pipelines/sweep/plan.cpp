@@ -272,6 +272,7 @@ class Planner {
 
   SweepPlan plan() {
     SweepPlan plan{sweep_.name, {}, {}, sweep_.threads, sweep_.memory_mb, sweep_.slurm, sweep_.hours};
+    plan.memory_retries = sweep_.memory_retries;
     for (const SweepBlock& block : sweep_.blocks) {
       if (block.search) plan.searches.push_back(planned(*block.search, block.name));
     }
@@ -475,14 +476,6 @@ std::string last_parts(const std::string& key, std::size_t count) {
   return at == std::string::npos ? key : key.substr(at + 1);
 }
 
-std::string plain_value(const std::string& json) {
-  constexpr std::size_t kMost = 40;
-  std::string text = json;
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
-  if (text.size() > kMost) text = "…" + text.substr(text.size() - kMost);
-  return is_plain_text(text) ? text : with_escapes(text);
-}
-
 }  // namespace
 
 const PlannedSearch* search_of(const SweepPlan& plan, const SweepRun& run) {
@@ -493,10 +486,18 @@ const PlannedSearch* search_of(const SweepPlan& plan, const SweepRun& run) {
 
 std::string short_sweep_key(const std::string& key) { return last_parts(key, 1); }
 
-std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys) {
+std::string plain_sweep_value(const std::string& json) {
+  constexpr std::size_t kMost = 40;
+  std::string text = json;
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  if (text.size() > kMost) text = "…" + text.substr(text.size() - kMost);
+  return is_plain_text(text) ? text : with_escapes(text);
+}
+
+std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys, std::size_t least) {
   std::vector<std::string> names;
   for (const std::string& key : keys) {
-    std::size_t count = 1;
+    std::size_t count = least;
     const auto is_like = [&](const std::string& other) {
       return other != key && last_parts(other, count) == last_parts(key, count);
     };
@@ -516,7 +517,7 @@ std::vector<SweepLabelPart> sweep_label_parts(const SweepRun& run) {
   for (const auto& [key, value] : run.values) keys.push_back(key);
   const std::vector<std::string> names = short_sweep_keys(keys);
   for (std::size_t i = 0; i < keys.size(); ++i)
-    parts.push_back({keys[i], names[i] + " " + plain_value(run.values[i].second)});
+    parts.push_back({keys[i], names[i] + " " + plain_sweep_value(run.values[i].second)});
   if (!run.seed.empty()) parts.push_back({"seed", "seed " + run.seed});
   return parts;
 }

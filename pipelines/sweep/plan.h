@@ -47,6 +47,7 @@ struct SweepPlan {
   SweepSlurm slurm;
   double hours = 0;  ///< of all runs, added up: none is started once they are over; 0: no limit
   std::vector<PlannedSearch> searches = {};
+  int memory_retries = 0;  ///< of a run that is killed for memory, each with twice as much
 };
 
 /// The search that a run is of, or null.
@@ -69,8 +70,12 @@ SweepRun without_repetition(SweepRun run);
 /// The last parts of keys that tell them apart: "iterations".
 std::string short_sweep_key(const std::string& key);
 
+/// A value as labels show it: words without quotes, long ones by their end.
+std::string plain_sweep_value(const std::string& json);
+
 /// So many last parts of each key as tell it from the others: "camera.lr", "body_pose.lr", "blur".
-std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys);
+/// @param least  parts
+std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys, std::size_t least = 1);
 
 /// Puts the combinations of a sweep together and reads each as a run would. Throws one UserError with every problem, of
 /// the file, its configs and its combinations, with the runs that it is in.

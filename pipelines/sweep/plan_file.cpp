@@ -155,6 +155,7 @@ std::string sweep_plan_json(const SweepPlan& plan) {
   tree.add("threads", ConfigValue::make_integer(plan.threads));
   tree.add("memory_mb", ConfigValue::make_number(plan.memory_mb));
   if (plan.hours > 0) tree.add("hours", ConfigValue::make_number(plan.hours));
+  if (plan.memory_retries > 0) tree.add("memory_retries", ConfigValue::make_integer(plan.memory_retries));
   tree.add("slurm", slurm_json(plan.slurm));
   tree.add("compare", words_json(plan.compare));
   ConfigValue searches = ConfigValue::make_array();
@@ -191,6 +192,11 @@ SweepPlan parse_sweep_plan(const std::string& text, const std::string& name) {
   plan.memory_mb = number_of(memory, "/memory_mb");
   if (plan.memory_mb < 0) fail_at(memory, "/memory_mb", shown(memory) + " is below 0");
   plan.hours = hours_of(tree);
+  if (find_member(tree, "memory_retries") != nullptr) {
+    plan.memory_retries = integer_of(tree, "memory_retries", "");
+    if (plan.memory_retries > kMostMemoryRetries)
+      fail_at(tree, "/memory_retries", "is above " + std::to_string(kMostMemoryRetries));
+  }
   plan.slurm = slurm_of(tree);
   plan.compare = words_of(tree, "compare", "");
   if (find_member(tree, "searches") != nullptr) {

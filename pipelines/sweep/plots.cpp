@@ -125,7 +125,8 @@ Column word_column(const std::string& name, const std::vector<std::string>& word
   Column column{name, {}};
   for (const std::string& word : words)
     column.places.push_back(place(static_cast<std::size_t>(std::find(all.begin(), all.end(), word) - all.begin())));
-  for (std::size_t i = 0; i < all.size(); ++i) column.marks.emplace_back(place(i), shortened(all[i], 14));
+  for (std::size_t i = 0; i < all.size(); ++i)
+    column.marks.emplace_back(place(i), shortened(plain_sweep_value(all[i]), 14));
   return column;
 }
 
@@ -144,7 +145,7 @@ std::string rank_color(std::size_t rank, std::size_t count) {
 std::vector<std::string> searched_names(const SearchResults& found) {
   std::vector<std::string> keys;
   for (const SearchedKey& key : found.search->over) keys.push_back(key.key);
-  return short_sweep_keys(keys);
+  return short_sweep_keys(keys, 2);
 }
 
 std::vector<Column> columns_of(const SearchResults& found) {
@@ -177,7 +178,8 @@ std::string point_text(const SearchResults& found, const SearchedPoint& point) {
   const MetricFacts& facts = *find_metric_facts(found.search->metric);
   const std::vector<std::string> names = searched_names(found);
   std::string text;
-  for (std::size_t key = 0; key < names.size(); ++key) text += names[key] + " " + point.values[key] + ", ";
+  for (std::size_t key = 0; key < names.size(); ++key)
+    text += names[key] + " " + plain_sweep_value(point.values[key]) + ", ";
   return text + std::string(facts.label) + " " + fixed_number(*point.scores[point.rung()], facts.decimals);
 }
 
@@ -189,7 +191,7 @@ std::string parallel_plot(const SearchResults& found) {
             .x_label = "",
             .unit = "",
             .series = {},
-            .width = std::max(420.0, 130.0 * static_cast<double>(columns.size())),
+            .width = std::max(900.0, 130.0 * static_cast<double>(columns.size())),
             .height = 300};
   for (const Column& column : columns) plot.columns.push_back(column.name);
   for (std::size_t i = found.points.size(); i-- > 0;) {  // the best one on top

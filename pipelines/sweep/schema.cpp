@@ -32,8 +32,9 @@ constexpr const char* kBlockProperties = R"({
     "anyOf": [
     {"type": "object", "additionalProperties": {"type": "array", "minItems": 1}},
     {"type": "array", "items": {"type": "object", "additionalProperties": {"type": "array", "minItems": 1}}}]},
-  "search": {"description": "Points of a space: settings that are tried until the runs are used up", "type": "object",
-    "properties": {
+  "search": {"description": "Points of a space: settings that are tried until the runs are used up", "anyOf": [
+    {"type": "object", "additionalProperties": false},
+    {"type": "object", "properties": {
     "metric": {"description": "What is searched for, by its name in summary.json: the best of it", "type": "string"},
     "method": {"description": "How points are chosen: evenly, or independently of each other",
                "enum": ["sobol", "random"], "default": "sobol"},
@@ -56,7 +57,7 @@ constexpr const char* kBlockProperties = R"({
       "factor": {"description": "Of so many points of a rung the best goes on", "type": "integer", "minimum": 2,
                  "maximum": 1000, "default": 2}},
       "required": ["rungs"], "additionalProperties": false}},
-    "required": ["metric", "runs", "over"], "additionalProperties": false},
+    "required": ["metric", "runs", "over"], "additionalProperties": false}]},
   "skip": {"description": "[{KEY: value}]: combinations that are left out", "type": "array",
     "items": {"type": "object"}, "minItems": 1},
   "only": {"description": "[{KEY: value}]: the only combinations that stay", "type": "array",

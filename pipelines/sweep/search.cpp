@@ -59,8 +59,15 @@ std::int64_t points_within(const SweepSearch& search, std::int64_t runs_per_poin
     for (const std::int64_t size : rung_sizes(points, rungs, search.factor)) all += size;
     return all <= search.runs / runs_per_point;
   };
-  std::int64_t points = std::min(kMostSweepRuns, search.runs / runs_per_point);
-  while (points > 0 && !fits(points)) --points;
+  std::int64_t points = 0, most = std::min(kMostSweepRuns, search.runs / runs_per_point);
+  while (points < most) {
+    const std::int64_t middle = (points + most + 1) / 2;
+    if (fits(middle)) {
+      points = middle;
+    } else {
+      most = middle - 1;
+    }
+  }
   return points;
 }
 

@@ -160,13 +160,13 @@ Table best_points_table(const SearchResults& found) {
                   (found.rungs > 1 ? "; those that have come to a higher rung first" : "");
   std::vector<std::string> keys;
   for (const SearchedKey& key : found.search->over) keys.push_back(key.key);
-  for (const std::string& name : short_sweep_keys(keys)) table.head.emplace_back(name);
+  for (const std::string& name : short_sweep_keys(keys, 2)) table.head.emplace_back(name);
   for (std::size_t rung = found.rungs; rung-- > 0;)
     table.head.emplace_back(metric_heading(facts) + (found.rungs > 1 ? ", rung " + std::to_string(rung + 1) : ""));
   for (std::size_t i = 0; i < std::min(kMost, found.points.size()); ++i) {
     const SearchedPoint& point = found.points[i];
     std::vector<Cell> cells = {std::to_string(i + 1)};
-    for (const std::string& value : point.values) cells.emplace_back(value);
+    for (const std::string& value : point.values) cells.emplace_back(plain_sweep_value(value));
     for (std::size_t rung = found.rungs; rung-- > 0;)
       cells.push_back(point.scores[rung] ? Cell(*point.scores[rung], facts.decimals) : Cell());
     table.rows.push_back(std::move(cells));
@@ -181,7 +181,8 @@ std::optional<Importance> importance_of(const std::vector<std::string>& values, 
   const std::vector<std::size_t> groups = value_groups(values);
   const std::size_t count = std::set<std::size_t>(groups.begin(), groups.end()).size();
   const double whole = squares_within(ranks, std::vector<std::size_t>(n));
-  if (count < 2 || count == n || whole == 0) return std::nullopt;
+  const auto [least, most] = std::minmax_element(ranks.begin(), ranks.end());
+  if (count < 2 || count == n || *least == *most) return std::nullopt;
   const double scale = static_cast<double>(n - 1) / static_cast<double>(n - count) / whole;
   const auto share = [&] { return 1 - scale * squares_within(ranks, groups); };
   Importance importance{share(), 0, 0};

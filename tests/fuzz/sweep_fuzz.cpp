@@ -22,7 +22,7 @@ constexpr std::string_view kBlocks =
   {"name": "two", "clips": ["clip.json"], "seeds": {"dim": {"background": [0, 0, 0]}}, "zip": [{"seed_of": [1, 2]}]}]})";
 
 constexpr std::string_view kSearch =
-    R"({"base": "base.json", "seeds": 2, "hours": 1.5, "search": {"metric": "mpjpe_mm", "method": "random", "seed": 3, "runs": 30,
+    R"({"base": "base.json", "seeds": 2, "hours": 1.5, "memory_retries": 1, "search": {"metric": "mpjpe_mm", "method": "random", "seed": 3, "runs": 30,
  "over": {"stages.a.lr": {"from": 1e-3, "to": 0.1, "scale": "log"}, "b.frames": {"from": 2, "to": 30, "integer": true},
   "color_net.use": ["on", "off", null]}, "halving": {"rungs": {"stages.a.iterations": [10, 20]}, "factor": 3}}})";
 

@@ -213,7 +213,7 @@ TEST_CASE("a search by halving has a run of every point in every rung") {
   write_tiny_base();
   const Json halving = {
       {"rungs", {{"stages.camera.iterations", {2, 4, 8}}, {"stages.interaction.iterations", {3, 6, 12}}}}};
-  const SweepPlan plan = plan_of(changed("/halving", halving), {{"hours", 1.5}});
+  const SweepPlan plan = plan_of(changed("/halving", halving), {{"hours", 1.5}, {"memory_retries", 2}});
   REQUIRE(plan.runs.size() == 15);  // of 5 points, of which 5 + 2 + 1 are computed
   CHECK(plan.hours == 1.5);
   for (std::size_t i = 0; i < plan.runs.size(); ++i) {
@@ -225,6 +225,7 @@ TEST_CASE("a search by halving has a run of every point in every rung") {
   const std::string text = sweep_plan_json(plan);
   const SweepPlan again = parse_sweep_plan(text, "sweep.json");
   CHECK(sweep_plan_json(again) == text);
+  CHECK(again.memory_retries == 2);
   CHECK(again.runs[14].rung == 2);
   CHECK(again.searches[0].rung_keys ==
         std::vector<std::string>{"stages.camera.iterations", "stages.interaction.iterations"});
@@ -310,6 +311,10 @@ TEST_CASE("mistakes of a search are told with their place") {
         "sweep.json:4: /search: there are 3 different points, and 6 runs (\"runs\") are 6; a grid has them all");
   CHECK(refused(search_json(), {{"grid", {{"color_net.use", {"on", "off"}}}}}) ==
         "sweep.json:19: color_net.use is set by grid and by search; one of them would not count");
+  CHECK(refused(search_json(), {{"memory_retries", 11}}) ==
+        "sweep.json:4: /memory_retries: 11 is out of range; allowed: 0 to 10");
+  CHECK(refused(search_json(), {{"memory_retries", 0.5}}) ==
+        "sweep.json:4: /memory_retries: 0.5 is not a whole number; allowed: 0 to 10");
   CHECK(refused(search_json(), {{"hours", -1}}) == "sweep.json:4: /hours: -1 is out of range; allowed: at least 0");
   Json many = search_json();
   for (int i = 0; i < 20; ++i) many["over"]["stages.x" + std::to_string(i) + ".lr"] = {1, 2};
