@@ -183,7 +183,7 @@ Area area_of(const Plot& plot, Range xs, Range ys, double top) {
 
 /// An axis for each column, named below it.
 std::string columns_svg(const Plot& plot, const Area& area) {
-  const auto most = static_cast<std::size_t>((area.at_x(1) - area.at_x(0)) / kLetter);
+  const auto most = static_cast<std::size_t>(0.85 * (area.at_x(1) - area.at_x(0)) / kLetter);
   std::string svg;
   for (std::size_t i = 0; i < plot.columns.size(); ++i) {
     const double x = area.at_x(static_cast<double>(i));

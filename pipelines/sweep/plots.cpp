@@ -92,7 +92,7 @@ struct Column {
   std::vector<std::pair<double, std::string>> marks{};  ///< place, text
 };
 
-/// Numbers between their least and largest.
+/// Numbers between their least and largest, above 0 on a logarithmic scale.
 /// @param better  −1: the least is at the top
 Column number_column(const std::string& name, const std::vector<double>& numbers, bool is_log, int better) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -148,6 +148,20 @@ std::vector<std::string> searched_names(const SearchResults& found) {
   return short_sweep_keys(keys, 2);
 }
 
+/// True for errors of which some are so large that the others would be as one on a linear scale.
+bool is_spread(const SearchResults& found, const MetricFacts& facts) {
+  constexpr double kLargestRatio = 4;
+  double low = std::numeric_limits<double>::infinity(), high = 0;
+  for (const SearchedPoint& point : found.points) {
+    for (const auto& score : point.scores) {
+      if (!score) continue;
+      low = std::min(low, *score);
+      high = std::max(high, *score);
+    }
+  }
+  return facts.better < 0 && low > 0 && high > kLargestRatio * low;
+}
+
 std::vector<Column> columns_of(const SearchResults& found) {
   const MetricFacts& facts = *find_metric_facts(found.search->metric);
   const std::vector<std::string> names = searched_names(found);
@@ -168,8 +182,9 @@ std::vector<Column> columns_of(const SearchResults& found) {
     for (const SearchedPoint& point : found.points)
       scores.push_back(point.scores[rung].value_or(std::numeric_limits<double>::quiet_NaN()));
     if (std::all_of(scores.begin(), scores.end(), [](double score) { return std::isnan(score); })) continue;
-    const std::string name = shown_metric(facts) + (found.rungs > 1 ? ", rung " + std::to_string(rung + 1) : "");
-    columns.push_back(number_column(name, scores, false, facts.better));
+    const std::string name = found.rungs > 1 ? "rung " + std::to_string(rung + 1) : "";
+    const std::string metric = found.rungs > 1 ? std::string(facts.label) + ", " : shown_metric(facts);
+    columns.push_back(number_column((rung == 0 ? metric : "") + name, scores, is_spread(found, facts), facts.better));
   }
   return columns;
 }
@@ -258,6 +273,7 @@ std::string setting_plot(const SearchResults& found, std::size_t key) {
             .x_label = searched_names(found)[key],
             .unit = std::string(facts.unit),
             .series = {},
+            .is_log = is_spread(found, facts),
             .is_log_x = found.search->over[key].is_log,
             .has_whole_x = false,
             .decimals = facts.decimals};
