@@ -133,6 +133,8 @@ std::string plan_text(const PlacedPlan& placed) {
   std::string text = runs_table(std::move(table)) + "\nsweep " + plan.name + ": " +
                      count_text(std::ssize(plan.runs), "combination") + ", " +
                      count_text(static_cast<std::int64_t>(runs), "run") + ", " + std::to_string(done) + " done";
+  const std::size_t left_out = left_out_by_halving(plan);
+  if (left_out > 0) text += ", " + std::to_string(left_out) + " left out by halving in the end";
   if (!datasets.empty()) text += "; " + count_text(std::ssize(datasets), "dataset") + " to be generated";
   return text + "; folder " + placed.paths.folder.string() + "\n";
 }

@@ -137,6 +137,14 @@ std::vector<SweepRunState> sweep_run_states(const SweepPaths& paths, const Sweep
   return states;
 }
 
+std::size_t left_out_by_halving(const SweepPlan& plan) {
+  SweepTurns turns(plan, [](std::size_t) { return std::nullopt; });  // which points go on does not matter
+  const std::vector<std::size_t> runs = distinct_runs(plan);
+  return static_cast<std::size_t>(std::count_if(runs.begin(), runs.end(), [&turns](std::size_t run) {
+    return turns.turn(run, [](std::size_t) { return false; }) == SweepTurn::kNever;
+  }));
+}
+
 double spent_hours(const SweepPaths& paths, const SweepPlan& plan) {
   double seconds = 0;
   for (const std::size_t run : distinct_runs(plan)) {

@@ -64,6 +64,9 @@ DoneMetrics done_metrics(const SweepPaths& paths, const SweepPlan& plan);
 /// How the runs of a plan stand, by index; new ones that halving leaves out as such.
 std::vector<SweepRunState> sweep_run_states(const SweepPaths& paths, const SweepPlan& plan);
 
+/// How many of the plan's different runs halving leaves out in the end.
+std::size_t left_out_by_halving(const SweepPlan& plan);
+
 /// What attempts at the plan's runs have taken so far, added up, of those that have ended.
 double spent_hours(const SweepPaths& paths, const SweepPlan& plan);
 

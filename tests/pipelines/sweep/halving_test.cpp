@@ -107,6 +107,7 @@ TEST_CASE("the best points of a rung are taken, those without a score last") {
 
 TEST_CASE("a launcher computes of each rung the better half, rung after rung") {
   HalvingSweep sweep;
+  CHECK(left_out_by_halving(sweep.plan) == kSeeds * (4 + 6));
   const SweepOutcome outcome = sweep.run();
   CHECK(outcome.failures.empty());
   CHECK(outcome.computed == kSeeds * (8 + 4 + 2));
