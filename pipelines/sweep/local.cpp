@@ -209,21 +209,25 @@ class Launcher {
   }
 
   /// What is waiting when the hours of the sweep are over is not started any more.
-  bool stops_for_budget() {
+  bool stops_for_budget(const std::function<bool(std::size_t)>& may_end) {
     if (waiting_.empty() || running_.size() >= jobs_ || !is_over_budget(paths_, plan_)) return false;
-    outcome_.over_budget += waiting_.size();
-    tell("the sweep's " + number_text(plan_.hours) + " h are spent: " + std::to_string(waiting_.size()) +
-         (waiting_.size() == 1 ? " run is" : " runs are") + " not started");
+    for (const std::size_t index : waiting_) {
+      const bool is_left_out = turns_.turn(index, may_end) == SweepTurn::kNever;
+      ++(is_left_out ? outcome_.left_out : outcome_.over_budget);
+    }
     waiting_.clear();
+    if (outcome_.over_budget > 0)
+      tell("the sweep's " + number_text(plan_.hours) + " h are spent: " + std::to_string(outcome_.over_budget) +
+           (outcome_.over_budget == 1 ? " run is" : " runs are") + " not started");
     return true;
   }
 
   void start_what_fits() {
     if (running_.size() == running_before_ && Clock::now() < next_try_) return;  // nothing has changed since
     next_try_ = Clock::now() + kBetweenLooks;
-    if (stops_for_budget()) return;
     for (Running& run : running_) known_peak_mb_ = std::max(known_peak_mb_, run.program.peak_mb());
     const auto may_end = [this](std::size_t run) { return open_.contains(id_of(run)); };
+    if (stops_for_budget(may_end)) return;
     for (auto it = waiting_.begin(); it != waiting_.end() && running_.size() < jobs_;) {
       const std::size_t index = *it;
       const SweepTurn turn = turns_.turn(index, may_end);

@@ -230,6 +230,12 @@ TEST_CASE("once its hours are over a sweep starts no other run, and goes on with
   note(5, 5000);
   CHECK(is_over_budget(sweep.made.paths(), sweep.plan));
   sweep.plan.hours = 0;
+  CHECK(sweep.run().computed == kSeeds * (8 + 4 + 2) - 5);
+  sweep.plan.hours = 1;
+  const SweepOutcome end = sweep.run();
+  CHECK(end.over_budget == 0);  // what halving leaves out was never to be computed
+  CHECK(end.left_out == kSeeds * (4 + 6));
+  sweep.plan.hours = 0;
   CHECK_FALSE(is_over_budget(sweep.made.paths(), sweep.plan));
 }
 
