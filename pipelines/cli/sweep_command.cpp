@@ -30,6 +30,7 @@
 #include "pipelines/cli/sweep_text.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/sweep/halving.h"
 #include "pipelines/sweep/local.h"
 #include "pipelines/sweep/run.h"
 #include "pipelines/sweep/slurm.h"
@@ -115,13 +116,14 @@ std::string plan_text(const PlacedPlan& placed) {
   const SweepPlan& plan = placed.plan;
   Table table{.head = {"INDEX", "RUN", "", "STATE"}};
   std::set<std::string> datasets;
+  const std::vector<SweepRunState> states = sweep_run_states(placed.paths, plan);
   std::size_t done = 0;
   for (std::size_t i = 0; i < plan.runs.size(); ++i) {
     const SweepRun& run = plan.runs[i];
     const auto same =
         std::find_if(plan.runs.begin(), plan.runs.end(), [&run](const SweepRun& other) { return other.id == run.id; });
     const auto first = static_cast<std::size_t>(same - plan.runs.begin());
-    const SweepRunState state = sweep_run_state(placed.paths, run.id);
+    const SweepRunState state = states[i];
     if (first == i && state == SweepRunState::kDone) ++done;
     if (!run.dataset.empty() && !fs::exists(placed.paths.dataset(run.dataset))) datasets.insert(run.dataset);
     table.rows.push_back({i, run.id, sweep_label(run),
@@ -131,6 +133,8 @@ std::string plan_text(const PlacedPlan& placed) {
   std::string text = runs_table(std::move(table)) + "\nsweep " + plan.name + ": " +
                      count_text(std::ssize(plan.runs), "combination") + ", " +
                      count_text(static_cast<std::int64_t>(runs), "run") + ", " + std::to_string(done) + " done";
+  const std::size_t left_out = left_out_by_halving(plan);
+  if (left_out > 0) text += ", " + std::to_string(left_out) + " left out by halving in the end";
   if (!datasets.empty()) text += "; " + count_text(std::ssize(datasets), "dataset") + " to be generated";
   return text + "; folder " + placed.paths.folder.string() + "\n";
 }
@@ -162,6 +166,9 @@ std::string failures_text(const SweepPlan& plan, const SweepOutcome& outcome) {
             failure.message + "\n";
   if (!outcome.not_done.empty())
     text += count_text(std::ssize(outcome.not_done), "run") + " not computed, after the failure\n";
+  if (outcome.over_budget > 0)
+    text += count_text(static_cast<std::int64_t>(outcome.over_budget), "run") + " not computed, as the sweep's " +
+            number_text(plan.hours) + " h are spent; with more, --resume goes on\n";
   return text;
 }
 
@@ -257,6 +264,25 @@ std::optional<SweepClaim> claim_of(const RunOneArguments& arguments, const Place
   return SweepClaim(placed.paths, id, observer.stop_requested);
 }
 
+/// Why a run is not computed that somebody asks for; empty: it is.
+std::string reason_against(const RunOneArguments& arguments, const PlacedPlan& placed, std::size_t index) {
+  const std::string run = "run " + std::to_string(index) + ", " + sweep_label(placed.plan.runs[index]);
+  if (sweep_run_state(placed.paths, placed.plan.runs[index].id) == SweepRunState::kDone) return "";
+  if (is_over_budget(placed.paths, placed.plan))
+    return run + ": is not started, as the sweep's " + number_text(placed.plan.hours) + " h are spent\n";
+  // An array of Slurm begins after those of the rungs below: what is not computed then will not be.
+  const auto may_end = [&](std::size_t other) {
+    const SweepRunState state = sweep_run_state(placed.paths, placed.plan.runs[other].id);
+    if (arguments.requeue) return state != SweepRunState::kDone && is_claimed(placed.paths, placed.plan.runs[other].id);
+    return state == SweepRunState::kNew || state == SweepRunState::kStarted;
+  };
+  const SweepTurn turn = SweepTurns(placed.plan, done_metrics(placed.paths, placed.plan)).turn(index, may_end);
+  if (turn == SweepTurn::kLater)
+    throw UserError(run + ": runs of the rung below are not done, and tell whether it is computed; hsi4d sweep " +
+                    placed.paths.folder.string() + " --resume computes them");
+  return turn == SweepTurn::kNever ? run + ": is left out, others of the rung below were better\n" : "";
+}
+
 /// Carries out a run that is ours.
 std::string claimed_run(const RunOneArguments& arguments, const PlacedPlan& placed, std::size_t index,
                         SweepClaim& claim, const std::vector<LossTerm>& losses, const Observer& observer) {
@@ -312,6 +338,8 @@ std::string run_one_command(const RunOneArguments& arguments, const std::vector<
   Observer observer = observer_on_terminal(false);
   observer.stop_requested = [] { return InterruptWatch::requested() || TimeLimitWatch::requested(); };
   const auto index = static_cast<std::size_t>(arguments.index);
+  const std::string reason = arguments.parent == 0 ? reason_against(arguments, placed, index) : "";  // else looked at
+  if (!reason.empty()) return reason;
   std::optional<SweepClaim> claim = claim_of(arguments, placed, index, observer);
   if (!claim) {
     status = kElsewhere;

@@ -2,6 +2,7 @@
 
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/sweep/search_results.h"
 
 namespace hsi4d::cli {
 
@@ -16,6 +17,7 @@ std::string sweep_text(const SweepPaths& paths, const SweepResults& results, int
   std::string text = results.plan.name + ": " + progress_text(results) + "\n";
   const auto add = [&text](const std::string& table) { text += table.empty() ? "" : "\n" + table; };
   if (results.count(SweepRunState::kDone) > 0) {
+    for (const SearchResults& found : search_results(results)) add(sweep_table_text(best_points_table(found), columns));
     add(sweep_table_text(mean_table(results), columns));
     add(sweep_table_text(difference_table(results), columns));
   }

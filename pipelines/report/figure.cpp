@@ -161,7 +161,11 @@ Area area_of(const Plot& plot, Range xs, Range ys, double top) {
   area.x = plot.is_log_x ? log_axis(xs) : linear_axis(xs, has_rows ? 4 : 8, !has_rows && plot.has_whole_x, has_rows);
   if (plot.is_log_x && !plot.ticks_x.empty()) area.x.ticks = plot.ticks_x;
   const auto rows = static_cast<double>(plot.rows.size());
-  if (has_rows)
+  if (!plot.columns.empty()) area.x.range = {-0.3, static_cast<double>(plot.columns.size()) - 0.7};
+  if (!plot.columns.empty()) area.left = kRight;
+  if (!plot.columns.empty())
+    area.y.range = {0, 1};
+  else if (has_rows)
     area.y.range = {rows - 0.5, -0.5};
   else
     area.y = plot.is_log ? log_axis(ys) : linear_axis(ys, 5, false, true);
@@ -170,12 +174,27 @@ Area area_of(const Plot& plot, Range xs, Range ys, double top) {
   if (has_rows) area.left = std::min(kMostLeft, 14 + kLetter * static_cast<double>(longest));
   area.right = plot.width - kRight;
   area.top = top;
+  if (!plot.columns.empty()) area.top += kLine;
   area.bottom = has_rows ? top + kRowHeight * rows : top + plot.height - kTop - kBottom;
   area.height = area.bottom + kBottom;
+  if (!plot.columns.empty()) area.bottom -= kLine / 2;
   return area;
 }
 
+/// An axis for each column, named below it.
+std::string columns_svg(const Plot& plot, const Area& area) {
+  const auto most = static_cast<std::size_t>(0.85 * (area.at_x(1) - area.at_x(0)) / kLetter);
+  std::string svg;
+  for (std::size_t i = 0; i < plot.columns.size(); ++i) {
+    const double x = area.at_x(static_cast<double>(i));
+    svg += line_svg("axis", x, area.top, x, area.bottom) +
+           text_svg("row", "middle", x, area.bottom + kBottom, shortened(plot.columns[i], most));
+  }
+  return svg + "\n";
+}
+
 std::string axes_svg(const Plot& plot, const Area& area) {
+  if (!plot.columns.empty()) return columns_svg(plot, area);
   std::string svg;
   const bool has_rows = !plot.rows.empty();
   for (const double tick : area.y.ticks)
@@ -199,7 +218,7 @@ std::string axes_svg(const Plot& plot, const Area& area) {
 
 /// The tooltip of a dot: of rows the label has all.
 std::string tip_of(const Plot& plot, const Series& series, const std::pair<double, double>& point) {
-  if (!plot.rows.empty()) return series.label;
+  if (!plot.rows.empty() || !plot.columns.empty()) return series.label;
   return series.label + ", " + plot.x_label + " " + tick_text(point.first) + ": " +
          fixed_number(point.second, plot.decimals) + (plot.unit.empty() ? "" : " " + plot.unit);
 }

@@ -28,18 +28,19 @@ struct Plot {
   std::string x_label;  ///< under the axis
   std::string unit;     ///< of y, in tooltips
   std::vector<Series> series;
-  Legend legend{};                  ///< above the axes
-  std::vector<std::string> rows{};  ///< y is not a number but a row, 0 the topmost one; these name them
-  bool is_log = false;              ///< y on a logarithmic scale; points ≤ 0 are left out
-  bool is_log_x = false;            ///< x likewise
-  std::vector<double> ticks_x{};    ///< of a logarithmic x; empty: round numbers
-  bool begins_at_zero = false;      ///< y, unless it is logarithmic; x where there are rows
-  std::vector<double> also{};       ///< what that axis reaches beside the points, so that plots have one in common
-  bool has_whole_x = true;          ///< x ticks at whole numbers only
-  int decimals = 2;                 ///< of y in tooltips
-  bool is_timed = false;            ///< x is the frame, of which the page's script marks the one that is looked at
-  double width = 380;               ///< in the units of the view box, where letters are 12 high; the page scales it
-  double height = 210;              ///< of the axes with their labels; rows have a height of their own
+  Legend legend{};                     ///< above the axes
+  std::vector<std::string> rows{};     ///< y is not a number but a row, 0 the topmost one; these name them
+  std::vector<std::string> columns{};  ///< x is a column, an axis of its own with y from 0 to 1; these name them
+  bool is_log = false;                 ///< y on a logarithmic scale; points ≤ 0 are left out
+  bool is_log_x = false;               ///< x likewise
+  std::vector<double> ticks_x{};       ///< of a logarithmic x; empty: round numbers
+  bool begins_at_zero = false;         ///< y, unless it is logarithmic; x where there are rows
+  std::vector<double> also{};          ///< what that axis reaches beside the points, so that plots have one in common
+  bool has_whole_x = true;             ///< x ticks at whole numbers only
+  int decimals = 2;                    ///< of y in tooltips
+  bool is_timed = false;               ///< x is the frame, of which the page's script marks the one that is looked at
+  double width = 380;                  ///< in the units of the view box, where letters are 12 high; the page scales it
+  double height = 210;                 ///< of the axes with their labels; rows have a height of their own
 };
 
 /// The plot as one <svg> element; a few words instead where there is nothing to plot.

@@ -33,10 +33,12 @@ class AxisChecks {
   /// A setting that two axes name, or of which one names a part: one of them would not count.
   void refuse_shared_keys(const SweepBlock& block) {
     named_.clear();
-    for (const auto* axes : {&block.grid, &block.zip}) {
+    for (const auto* axes : {&block.grid, &block.zip, &block.searched}) {
       for (std::size_t i = 0; i < axes->size(); ++i) {
-        const std::string who =
-            axes == &block.grid ? "grid" : "zip" + (block.zip.size() > 1 ? " " + std::to_string(i) : "");
+        const std::string who = axes == &block.grid ? "grid"
+                                : axes == &block.searched
+                                    ? "search"
+                                    : "zip" + (block.zip.size() > 1 ? " " + std::to_string(i) : "");
         for (const SweepSetting& setting : (*axes)[i].points.front()) name_key(setting, who, i);
       }
     }
@@ -85,10 +87,8 @@ class AxisChecks {
       for (const std::string& name : kNamedAxes) {
         if (has_sweep_axis(block, name)) add_name(name);
       }
-      for (const auto* axes : {&block.grid, &block.zip}) {
-        for (const SweepAxis& axis : *axes) {
-          for (const std::string& key : axis.keys) add_name(sweep_key(key));
-        }
+      for (const SweepAxis* const axis : setting_axes(block)) {
+        for (const std::string& key : axis->keys) add_name(sweep_key(key));
       }
     }
     return names;
@@ -139,6 +139,14 @@ class AxisChecks {
 
 }  // namespace
 
+std::vector<const SweepAxis*> setting_axes(const SweepBlock& block) {
+  std::vector<const SweepAxis*> all;
+  for (const auto* axes : {&block.searched, &block.grid, &block.zip}) {
+    for (const SweepAxis& axis : *axes) all.push_back(&axis);
+  }
+  return all;
+}
+
 void check_sweep_axes(const SweepFile& sweep, ConfigProblems& problems) { AxisChecks(sweep, problems).run(); }
 
 std::int64_t sweep_combinations(const SweepBlock& block) {
@@ -147,9 +155,7 @@ std::int64_t sweep_combinations(const SweepBlock& block) {
     if (choices > 0) count = std::min(count * static_cast<std::int64_t>(choices), kMostSweepRuns + 1);
   };
   for (const std::size_t choices : {block.clips.size(), block.ablations.size(), block.seeds.size()}) cross(choices);
-  for (const auto* axes : {&block.grid, &block.zip}) {
-    for (const SweepAxis& axis : *axes) cross(axis.points.size());
-  }
+  for (const SweepAxis* const axis : setting_axes(block)) cross(axis->points.size());
   return count;
 }
 
@@ -158,11 +164,9 @@ bool has_sweep_axis(const SweepBlock& block, const std::string& key) {
   if (key == "clip") return !block.clips.empty();
   if (key == "ablation") return !block.ablations.empty();
   if (key == "seed") return !block.seeds.empty();
-  for (const auto* axes : {&block.grid, &block.zip}) {
-    for (const SweepAxis& axis : *axes) {
-      for (const std::string& own : axis.keys) {
-        if (sweep_key(own) == sweep_key(key)) return true;
-      }
+  for (const SweepAxis* const axis : setting_axes(block)) {
+    for (const std::string& own : axis->keys) {
+      if (sweep_key(own) == sweep_key(key)) return true;
     }
   }
   return false;

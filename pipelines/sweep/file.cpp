@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <limits>
 #include <set>
 
@@ -9,6 +10,9 @@
 #include "core/config_place.h"
 #include "core/suggest.h"
 #include "core/text.h"
+#include "pipelines/metrics/metric_facts.h"
+#include "pipelines/sweep/search.h"
+#include "pipelines/sweep/sobol.h"
 
 namespace hsi4d {
 namespace {
@@ -16,9 +20,45 @@ namespace {
 using Kind = ConfigValue::Kind;
 using Strings = std::vector<std::string>;
 
-const Strings kBlockKeys = {"name", "base", "set", "clips", "seeds", "ablations", "grid", "zip", "skip", "only"};
-const Strings kFileKeys = {"name", "base", "set",    "clips",   "seeds",   "ablations", "grid", "zip",
-                           "skip", "only", "blocks", "compare", "threads", "memory_mb", "slurm"};
+const Strings kBlockKeys = {"name", "base", "set",    "clips", "seeds", "ablations",
+                            "grid", "zip",  "search", "skip",  "only"};
+const Strings kFileKeys = {"name",    "base",    "set",   "clips",     "seeds",          "ablations",
+                           "grid",    "zip",     "skip",  "only",      "search",         "blocks",
+                           "compare", "threads", "hours", "memory_mb", "memory_retries", "slurm"};
+
+constexpr ConfigChoice<SweepSampling> kSamplings[] = {{SweepSampling::kSobol, "sobol"},
+                                                      {SweepSampling::kRandom, "random"}};
+constexpr ConfigChoice<bool> kScales[] = {{false, "linear"}, {true, "log"}};
+constexpr double kMostNumber = 1e15, kLeastLog = 1e-15;  // of ranges; whole numbers up to the first are exact
+
+void describe(ConfigFields& f, SweepRange& r) {
+  f.number("from", r.from, {.min = -kMostNumber, .max = kMostNumber}, "The least value").required();
+  f.number("to", r.to, {.min = -kMostNumber, .max = kMostNumber}, "The largest value").required();
+  f.choice("scale", r.is_log, kScales, "Of equal differences as many values, or of equal ratios");
+  f.boolean("integer", r.is_integer, "Whole numbers alone, both ends among them");
+  f.rule({"to", "from"}, [&r]() -> std::string {
+    return r.from < r.to ? "" : number_text(r.to) + " is not above \"from\", " + number_text(r.from);
+  });
+  f.rule({"from", "scale", "integer"}, [&r]() -> std::string {
+    const double least = r.is_integer ? 1 : kLeastLog;
+    return !r.is_log || r.from >= least
+               ? ""
+               : number_text(r.from) + " has no place on a logarithmic scale; allowed: " + number_text(least) +
+                     " or more";
+  });
+  f.rule({"integer", "from", "to"}, [&r]() -> std::string {
+    const bool is_whole = std::floor(r.from) == r.from && std::floor(r.to) == r.to;
+    return !r.is_integer || is_whole ? "" : "\"from\" and \"to\" of whole numbers are whole numbers";
+  });
+}
+
+void describe(ConfigFields& f, SweepSearch& s) {
+  f.string("metric", s.metric, "What is searched for, by its name in summary.json: the best of it").required();
+  f.choice("method", s.method, kSamplings, "How points are chosen: evenly, or independently of each other");
+  f.integer("seed", s.seed, {.min = 0}, "Of the points");
+  f.integer("runs", s.runs, {.min = 1, .max = kMostSweepRuns}, "The most runs, of all points, clips and seeds together")
+      .required();
+}
 
 void describe(ConfigFields& f, SweepSlurm& s) {
   f.string("time", s.time, "Time of a run, as sbatch takes it: 02:00:00; empty: the partition's");
@@ -98,7 +138,7 @@ class Reader {
           json_string(sweep.name) + ", after the file, cannot be the name of a folder; allowed: " + kFileNameText);
     ConfigFields fields;
     describe(fields, sweep);
-    read_config(with_members(tree, {"threads", "memory_mb", "slurm"}), fields, problems_);
+    read_config(with_members(tree, {"threads", "hours", "memory_mb", "memory_retries", "slurm"}), fields, problems_);
     check_slurm(tree, sweep.slurm);
     if (const ConfigValue* const compare = find_member(tree, "compare")) sweep.compare = settings(*compare, "/compare");
     read_blocks(tree, whole, sweep);
@@ -269,6 +309,13 @@ class Reader {
     if (read_clip_file(*file, file_place, clip)) all.push_back(std::move(clip));
   }
 
+  bool refuse_seed(const SweepSetting& setting, const std::string& in) {
+    if (sweep_key(setting.key) != "seed") return false;
+    add(setting.origin, child_pointer(in, setting.key),
+        "seeds are an axis of their own: write \"seeds\": [0, 1] beside the grid");
+    return true;
+  }
+
   /// {KEY: [values], ...}, an axis a key.
   std::vector<SweepAxis> axes(const ConfigValue& tree, const std::string& in) {
     std::vector<SweepAxis> all;
@@ -279,10 +326,7 @@ class Reader {
         add(setting.value.origin, place, "has no values; give some, or leave it out");
         continue;
       }
-      if (sweep_key(setting.key) == "seed") {
-        add(setting.origin, place, "seeds are an axis of their own: write \"seeds\": [0, 1] beside the grid");
-        continue;
-      }
+      if (refuse_seed(setting, in)) continue;
       SweepAxis axis{{setting.key}, {}};
       for (const ConfigValue& value : setting.value.items) axis.points.push_back({{setting.key, value, value.origin}});
       all.push_back(std::move(axis));
@@ -354,6 +398,136 @@ class Reader {
     }
   }
 
+  // ---- Search ----
+
+  /// {"from": 0.001, "to": 0.1, ...}, or a list of choices.
+  std::optional<SweepRange> range(const SweepSetting& setting, const std::string& in) {
+    SweepRange range{setting.key, setting.origin, {}};
+    if (setting.value.kind == Kind::kArray) {
+      SweepAxis choices{{setting.key}, {}};
+      for (const ConfigValue& value : setting.value.items)
+        choices.points.push_back({{setting.key, value, value.origin}});
+      refuse_equal_points(choices, in);
+      if (setting.value.items.size() < 2)
+        add(setting.value.origin, child_pointer(in, setting.key), "a choice is of two values or more");
+      range.choices = setting.value.items;
+      return range;
+    }
+    const std::string place = child_pointer(in, setting.key);
+    if (!expect(setting.value, Kind::kObject, place, "a list of choices, or a range, {\"from\": 0.001, \"to\": 0.1}"))
+      return std::nullopt;
+    ConfigFields fields;
+    describe(fields, range);
+    read_config(setting.value, fields, problems_, place);
+    return range;
+  }
+
+  void read_halving(const ConfigValue& tree, const std::string& in, SweepSearch& search) {
+    if (!expect(tree, Kind::kObject, in, "an object, {\"rungs\": {KEY: [values]}}")) return;
+    refuse_unknown(tree, {"rungs", "factor"}, in);
+    ConfigFields fields;
+    fields.integer("factor", search.factor, {.min = 2, .max = 1000}, "Of so many points of a rung the best goes on");
+    read_config(with_members(tree, {"factor"}), fields, problems_, in);
+    const ConfigValue* const rungs = find_member(tree, "rungs");
+    if (rungs == nullptr) return add(tree.origin, in, "names no \"rungs\": {KEY: [values]}, the cheapest first");
+    const std::string place = child_pointer(in, "rungs");
+    std::vector<SweepAxis> zipped;
+    add_zip(*rungs, place, zipped);
+    if (zipped.empty()) return;  // told
+    search.rungs = std::move(zipped.front());
+    if (search.rungs.points.size() < 2)
+      add(rungs->origin, place, "there is one rung; give each key two values or more");
+  }
+
+  std::optional<SweepSearch> search(const ConfigValue& tree, const std::string& in, bool has_inherited) {
+    if (!expect(tree, Kind::kObject, in, "an object, {\"over\": {KEY: range}, ...}") ||
+        is_empty(tree, in, has_inherited))
+      return std::nullopt;
+    const std::size_t before = problems_.size();
+    SweepSearch search;
+    search.pointer = in;
+    search.origin = tree.origin;
+    refuse_unknown(tree, {"metric", "method", "seed", "runs", "over", "halving"}, in);
+    ConfigFields fields;
+    describe(fields, search);
+    read_config(with_members(tree, {"metric", "method", "seed", "runs"}), fields, problems_, in);
+    if (const ConfigValue* const metric = find_member(tree, "metric"))
+      check_metric(*metric, child_pointer(in, "metric"));
+    const ConfigValue* const over = find_member(tree, "over");
+    const std::string place = child_pointer(in, "over");
+    if (over == nullptr) add(tree.origin, in, "names nothing to search \"over\": {KEY: range}");
+    const bool has_over = over != nullptr && expect(*over, Kind::kObject, place, "an object, {KEY: range}") &&
+                          !is_empty(*over, place, false);
+    for (const SweepSetting& setting : has_over ? settings(*over, place) : std::vector<SweepSetting>()) {
+      if (refuse_seed(setting, place)) continue;
+      if (const auto read = range(setting, place)) search.over.push_back(*read);
+    }
+    if (search.method == SweepSampling::kSobol && search.over.size() > kMostSobolDimensions)
+      add(over->origin, place,
+          std::to_string(search.over.size()) + " settings are more than the " + std::to_string(kMostSobolDimensions) +
+              " that Sobol's points are known for; \"method\": \"random\" takes any number");
+    if (const ConfigValue* const halving = find_member(tree, "halving"))
+      read_halving(*halving, child_pointer(in, "halving"), search);
+    if (problems_.size() > before) return std::nullopt;
+    return search;
+  }
+
+  /// A metric that has a better side.
+  void check_metric(const ConfigValue& value, const std::string& pointer) {
+    if (value.kind != Kind::kString) return;  // told
+    const MetricFacts* const facts = find_metric_facts(value.text);
+    if (facts != nullptr && facts->better != 0) return;
+    Strings known;
+    for (const MetricFacts& metric : metric_facts()) {
+      if (metric.better != 0) known.emplace_back(metric.name);
+    }
+    const std::string hint = did_you_mean(value.text, known);
+    add(value.origin, pointer,
+        facts != nullptr
+            ? json_string(value.text) + " is neither better large nor small; allowed: " + joined(known)
+            : json_string(value.text) + " is no metric" + (hint.empty() ? "; known: " + joined(known) : hint));
+  }
+
+  /// The axes that the search of a whole block comes to.
+  void add_searched_axes(SweepBlock& block) {
+    if (!block.search) return;
+    const SweepSearch& search = *block.search;
+    const std::int64_t per_point = sweep_combinations(block), points = points_within(search, per_point);
+    const auto tell = [&](const std::string& text) {
+      if (told_.insert(text + search.pointer).second) add(search.origin, search.pointer, text);
+    };
+    const std::string within = std::to_string(search.runs) + " runs (\"runs\")";
+    if (points == 0)
+      return tell(within + " are too few: each point is " + std::to_string(per_point) +
+                  " runs, of clips, seeds and the other axes");
+    std::int64_t least = 2;
+    for (std::size_t i = 1; i < search.rungs.points.size() && least <= kMostSweepRuns; ++i)
+      least = i == 1 ? search.factor : least * search.factor;
+    if (points < least)
+      return tell(within + " are " + std::to_string(points) + (points == 1 ? " point" : " points") + " of " +
+                  std::to_string(per_point) + (per_point == 1 ? " run" : " runs") +
+                  "; allowed: " + std::to_string(least) + " points or more" +
+                  (search.rungs.points.empty() ? "" : ", of which halving leaves one in the last rung"));
+    const std::optional<std::int64_t> all = points_of_space(search.over);
+    if (all && *all < points)
+      return tell("there are " + std::to_string(*all) + " different points, and " + within + " are " +
+                  std::to_string(points) + "; a grid has them all");
+    std::optional<SweepAxis> axis = search_points(search, points);
+    if (!axis)
+      return tell(std::to_string(points) + " different points were not found, some are too unlikely; ask for fewer");
+    if (!search.rungs.points.empty()) block.searched.push_back(search.rungs);
+    block.searched.push_back(std::move(*axis));
+  }
+
+  /// Results of a search are told by the name of its block.
+  void refuse_nameless_searches(const SweepFile& sweep) {
+    if (sweep.blocks.size() < 2) return;
+    for (const SweepBlock& block : sweep.blocks) {
+      if (block.search && block.name.empty())
+        add(block.origin, block.pointer, "has a search beside other blocks; give it a \"name\"");
+    }
+  }
+
   /// @param above  what the file says for all blocks; empty for the file itself
   SweepBlock read_block(const ConfigValue& tree, const std::string& in, const SweepBlock& above) {
     SweepBlock block = above;
@@ -379,6 +553,8 @@ class Reader {
       block.ablations = ablations(*own, at("ablations"), !above.ablations.empty());
     if (const ConfigValue* const own = member("grid")) block.grid = grid(*own, at("grid"), !above.grid.empty());
     if (const ConfigValue* const own = member("zip")) block.zip = zips(*own, at("zip"), !above.zip.empty());
+    if (const ConfigValue* const own = member("search"))
+      block.search = search(*own, at("search"), above.search.has_value());
     if (const ConfigValue* const own = member("skip")) read_rules(*own, at("skip"), true, block.rules);
     if (const ConfigValue* const own = member("only")) read_rules(*own, at("only"), false, block.rules);
     return block;
@@ -389,7 +565,8 @@ class Reader {
     if (blocks == nullptr) {
       sweep.blocks.push_back(whole);
       sweep.blocks.back().name.clear();
-      refuse_too_many(tree.origin, "", sweep_combinations(whole));
+      add_searched_axes(sweep.blocks.back());
+      refuse_too_many(tree.origin, "", sweep_combinations(sweep.blocks.back()));
       return;
     }
     if (!expect(*blocks, Kind::kArray, "/blocks", "a list of blocks, [{...}]") || is_empty(*blocks, "/blocks", false))
@@ -402,12 +579,14 @@ class Reader {
       if (!expect(own, Kind::kObject, place, "an object")) continue;
       refuse_unknown(own, kBlockKeys, place);
       sweep.blocks.push_back(read_block(own, place, whole));
+      add_searched_axes(sweep.blocks.back());
       const std::string& name = sweep.blocks.back().name;
       if (!name.empty() && !names.insert(name).second)
         add(find_member(own, "name")->origin, place + "/name", json_string(name) + " is the name of another block too");
       runs += sweep_combinations(sweep.blocks.back());
       if (refuse_too_many(own.origin, place, runs)) return;  // each block has seeds and axes of its own in memory
     }
+    refuse_nameless_searches(sweep);
   }
 
   bool refuse_too_many(const ConfigOrigin& origin, const std::string& pointer, std::int64_t runs) {
@@ -447,13 +626,17 @@ class Reader {
   }
 
   ConfigProblems& problems_;
+  std::set<std::string> told_;  // of searches that several blocks have taken over
 };
 
 }  // namespace
 
 void describe(ConfigFields& f, SweepFile& s) {
   f.integer("threads", s.threads, {.min = 0, .max = 1024}, "Threads of a run; 0: the cores are shared out");
+  f.number("hours", s.hours, {.min = 0}, "What all runs may take, added up: then none is started; 0: no limit");
   f.number("memory_mb", s.memory_mb, {.min = 0}, "What a run takes at most, MB; 0: not known");
+  f.integer("memory_retries", s.memory_retries, {.min = 0, .max = kMostMemoryRetries},
+            "So often a run that is killed for memory is computed again, each time with twice as much");
   f.object("slurm", s.slurm, "How Slurm starts the runs",
            [](ConfigFields& fields, SweepSlurm& slurm) { describe(fields, slurm); });
 }

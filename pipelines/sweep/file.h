@@ -39,6 +39,32 @@ struct SweepAxis {
   std::vector<std::vector<SweepSetting>> points;  ///< a setting a key
 };
 
+/// What a setting is searched over: choices, or the numbers of a range.
+struct SweepRange {
+  std::string key;      ///< as written
+  ConfigOrigin origin;  ///< of the key
+  std::vector<ConfigValue> choices;
+  double from = 0, to = 0;  ///< without choices
+  bool is_log = false;      ///< of equal ratios as many, not of equal differences
+  bool is_integer = false;  ///< whole numbers, both ends among them
+};
+
+/// How the points of a search are chosen.
+enum class SweepSampling { kSobol, kRandom };
+
+/// Points of a space, of which each is a setting of every key of `over`.
+struct SweepSearch {
+  std::string metric;  ///< what is searched for: the best of it
+  SweepSampling method = SweepSampling::kSobol;
+  std::int64_t seed = 0;
+  std::int64_t runs = 0;  ///< the most, of all points, clips and seeds together
+  std::vector<SweepRange> over;
+  SweepAxis rungs;      ///< of successive halving, the cheapest first; without points: all are computed in full
+  int factor = 2;       ///< of so many points of a rung one goes on
+  std::string pointer;  ///< of the search
+  ConfigOrigin origin;
+};
+
 /// An entry of `skip` or `only`.
 struct SweepRule {
   std::vector<SweepSetting> values;  ///< key: block, clip, ablation, seed or that of an axis
@@ -55,6 +81,8 @@ struct SweepBlock {
   std::vector<SweepClip> clips;         ///< empty: what the base says
   std::vector<SweepVariant> ablations;  ///< empty: none
   std::vector<SweepAxis> grid, zip;
+  std::optional<SweepSearch> search;
+  std::vector<SweepAxis> searched;  ///< what the search comes to: its rungs, if it has any, then its points
   std::vector<SweepVariant> seeds;  ///< empty: what the base says
   std::vector<SweepRule> rules;
   std::string pointer;  ///< of the block; empty: it is the file itself
@@ -74,13 +102,18 @@ struct SweepSlurm {
 /// The most runs that a sweep's file may ask for, before `skip` and `only` leave some out.
 inline constexpr std::int64_t kMostSweepRuns = 100000;
 
+/// The most retries of a run that is killed for memory: the last one has a thousand times as much.
+inline constexpr int kMostMemoryRetries = 10;
+
 /// A sweep's file, read.
 struct SweepFile {
   std::string name;
   std::vector<SweepBlock> blocks;
   std::vector<SweepSetting> compare;  ///< what the others are compared with; empty: not said
   int threads = 0;                    ///< of each run; 0: not said
+  double hours = 0;                   ///< of all runs, added up; 0: no limit
   double memory_mb = 0;               ///< of each run; 0: not said
+  int memory_retries = 0;             ///< of a run that is killed for memory, each with twice as much
   SweepSlurm slurm;
 };
 
@@ -98,6 +131,9 @@ std::string sweep_schema();
 /// @param tree  what load_config made of it
 /// @param file  whose name the sweep has where it does not say one
 SweepFile read_sweep_file(const ConfigValue& tree, const std::filesystem::path& file, ConfigProblems& problems);
+
+/// The axes of settings that a block has: searched, grid, zip.
+std::vector<const SweepAxis*> setting_axes(const SweepBlock& block);
 
 /// Adds what is wrong with a sweep's axes as they stand beside each other: settings that two of them name, rules and
 /// comparisons of what is no axis.

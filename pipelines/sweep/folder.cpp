@@ -169,6 +169,8 @@ std::string_view sweep_run_state_name(SweepRunState state) {
       return "failed";
     case SweepRunState::kDone:
       return "done";
+    case SweepRunState::kLeftOut:
+      return "left out";
   }
   return "";
 }

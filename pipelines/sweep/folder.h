@@ -66,12 +66,13 @@ void write_sweep_plan(const SweepPaths& paths, const SweepPlan& plan, bool resum
 void check_sweep_folder(const SweepPaths& paths, bool resume);
 
 /// How a run of a sweep stands.
-enum class SweepRunState { kNew, kStarted, kFailed, kDone };
+enum class SweepRunState { kNew, kStarted, kFailed, kDone, kLeftOut };
 
-/// "new", "started", "failed" or "done".
+/// "new", "started", "failed", "done" or "left out".
 std::string_view sweep_run_state_name(SweepRunState state);
 
-/// How a run stands: done where its status says so and its summary is whole; else as its last attempt tells.
+/// How a run stands: done where its status says so and its summary is whole; else as its last attempt tells. Which ones
+/// halving leaves out the plan tells too: sweep_run_states.
 SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id);
 
 /// True for a run that is done, has its report, and whose attempts tell of its end: nobody needs to start it again. A

@@ -1,12 +1,15 @@
 #include "pipelines/sweep/local.h"
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <deque>
 #include <filesystem>
 #include <fstream>
 #include <list>
+#include <map>
 #include <optional>
+#include <set>
 #include <thread>
 #include <unistd.h>
 #include <utility>
@@ -18,6 +21,7 @@
 #include "core/observer.h"
 #include "core/process.h"
 #include "core/text.h"
+#include "pipelines/sweep/halving.h"
 
 namespace hsi4d {
 namespace {
@@ -75,7 +79,8 @@ class Launcher {
         launch_(launch),
         frozen_plan_(paths.frozen_plan(plan)),
         jobs_(static_cast<std::size_t>(sweep_jobs(plan, launch))),
-        begin_(Clock::now()) {}
+        begin_(Clock::now()),
+        turns_(plan, done_metrics(paths, plan)) {}
 
   SweepOutcome run() {
     for (const std::size_t index : distinct_runs(plan_)) {
@@ -87,6 +92,7 @@ class Launcher {
       }
       learn_from(read_attempts(paths_, id_of(index)));
     }
+    for (const std::size_t index : waiting_) open_.insert(id_of(index));
     if (outcome_.done_before > 0)
       tell(std::to_string(outcome_.done_before) + " of " + std::to_string(total_) + " runs are done already");
     try {
@@ -133,28 +139,27 @@ class Launcher {
     ++seconds_count_;
   }
 
-  /// What one more run will take: what the sweep says, or the most that one of its runs has taken.
-  double needed_mb() const { return std::max(plan_.memory_mb, known_peak_mb_); }
-
-  bool has_memory_for_one() {
-    if (launch_.memory_mb <= 0) return true;
-    if (running_.empty()) {
-      if (needed_mb() > launch_.memory_mb) warn_of_memory();
-      return true;
-    }
-    double taken = 0;
-    for (Running& run : running_) {
-      const double peak = run.program.peak_mb();
-      known_peak_mb_ = std::max(known_peak_mb_, peak);
-      taken += std::max(plan_.memory_mb, peak);
-    }
-    taken = std::max(taken, needed_mb() * static_cast<double>(running_.size()));
-    return taken + needed_mb() <= launch_.memory_mb;
+  /// What a run will take: what the sweep says, or the most that one of its runs has taken; twice as much after each
+  /// time that it was killed for memory.
+  double needed_mb(std::size_t index) const {
+    const auto killed = killed_.find(id_of(index));
+    return std::ldexp(std::max(plan_.memory_mb, known_peak_mb_), killed == killed_.end() ? 0 : killed->second);
   }
 
-  void warn_of_memory() {
+  bool has_memory_for(std::size_t index) {
+    if (launch_.memory_mb <= 0) return true;
+    if (running_.empty()) {
+      if (needed_mb(index) > launch_.memory_mb) warn_of_memory(needed_mb(index));
+      return true;
+    }
+    double taken = needed_mb(index);
+    for (const Running& run : running_) taken += needed_mb(run.index);
+    return taken <= launch_.memory_mb;
+  }
+
+  void warn_of_memory(double needed_mb) {
     if (std::exchange(has_warned_of_memory_, true)) return;
-    tell("a run takes up to " + rounded(needed_mb(), 3) + " MB, and there are " + rounded(launch_.memory_mb, 3) +
+    tell("a run takes up to " + rounded(needed_mb, 3) + " MB, and there are " + rounded(launch_.memory_mb, 3) +
          " MB for all together: one at a time is computed, and may end for want of memory");
   }
 
@@ -173,7 +178,8 @@ class Launcher {
   }
 
   std::size_t ended() const {
-    return outcome_.done_before + outcome_.computed + outcome_.by_others + outcome_.failures.size();
+    return outcome_.done_before + outcome_.computed + outcome_.by_others + outcome_.failures.size() +
+           outcome_.left_out + outcome_.over_budget;
   }
 
   void report(bool is_finished) {
@@ -202,15 +208,39 @@ class Launcher {
                        [&](const Running& run) { return plan_.runs[run.index].dataset == dataset; });
   }
 
+  /// What is waiting when the hours of the sweep are over is not started any more.
+  bool stops_for_budget(const std::function<bool(std::size_t)>& may_end) {
+    if (waiting_.empty() || running_.size() >= jobs_ || !is_over_budget(paths_, plan_)) return false;
+    for (const std::size_t index : waiting_) {
+      const bool is_left_out = turns_.turn(index, may_end) == SweepTurn::kNever;
+      ++(is_left_out ? outcome_.left_out : outcome_.over_budget);
+    }
+    waiting_.clear();
+    if (outcome_.over_budget > 0)
+      tell("the sweep's " + number_text(plan_.hours) + " h are spent: " + std::to_string(outcome_.over_budget) +
+           (outcome_.over_budget == 1 ? " run is" : " runs are") + " not started");
+    return true;
+  }
+
   void start_what_fits() {
     if (running_.size() == running_before_ && Clock::now() < next_try_) return;  // nothing has changed since
     next_try_ = Clock::now() + kBetweenLooks;
-    for (auto it = waiting_.begin(); it != waiting_.end() && running_.size() < jobs_ && has_memory_for_one();) {
+    for (Running& run : running_) known_peak_mb_ = std::max(known_peak_mb_, run.program.peak_mb());
+    const auto may_end = [this](std::size_t run) { return open_.contains(id_of(run)); };
+    if (stops_for_budget(may_end)) return;
+    for (auto it = waiting_.begin(); it != waiting_.end() && running_.size() < jobs_;) {
       const std::size_t index = *it;
-      if (is_claimed(paths_, id_of(index)) || waits_for_dataset(index)) {
+      const SweepTurn turn = turns_.turn(index, may_end);
+      if (turn == SweepTurn::kNever) {
+        it = waiting_.erase(it);
+        open_.erase(id_of(index));
+        ++outcome_.left_out;
+      } else if (turn == SweepTurn::kLater || !has_memory_for(index) || is_claimed(paths_, id_of(index)) ||
+                 waits_for_dataset(index)) {
         ++it;
       } else if (is_sweep_run_whole(paths_, id_of(index))) {  // since we looked
         it = waiting_.erase(it);
+        open_.erase(id_of(index));
         ++outcome_.by_others;
         tell_end(index, "was done by another launcher");
       } else {
@@ -263,10 +293,19 @@ class Launcher {
     const bool has_noted = attempts.size() > run.noted_before && attempts.back().event == "failed";
     const std::string message = has_noted ? attempts.back().message : failure_text(run, end);
     if (!has_noted) note_attempt(run.index, message, run.program.seconds(), end.peak_mb);
+    if (end.signal == SIGKILL && killed_[id_of(run.index)] < plan_.memory_retries) return retry(run.index, message);
     add_failure({run.index, message, end.status == exit_status::kOurBug});
   }
 
+  /// With twice the memory, behind all that wait.
+  void retry(std::size_t index, const std::string& message) {
+    ++killed_[id_of(index)];
+    waiting_.push_back(index);
+    tell_end(index, message + "; it is computed again, with " + rounded(needed_mb(index), 3) + " MB");
+  }
+
   void note_done(const Running& run, const ProgramEnd& end) {
+    open_.erase(id_of(run.index));
     ++outcome_.computed;
     note_seconds(run.program.seconds());
     tell_end(run.index, "done in " + duration_text(run.program.seconds()) +
@@ -274,6 +313,7 @@ class Launcher {
   }
 
   void add_failure(SweepFailure failure) {
+    open_.erase(id_of(failure.index));
     outcome_.failures.push_back(std::move(failure));
     tell_end(outcome_.failures.back().index, "failed: " + outcome_.failures.back().message);
   }
@@ -353,6 +393,9 @@ class Launcher {
   double last_report_ = 0, known_peak_mb_ = 0, seconds_sum_ = 0;
   std::size_t seconds_count_ = 0;
   std::deque<std::size_t> waiting_;
+  std::set<std::string> open_;         // ids of runs that may still be done
+  std::map<std::string, int> killed_;  // for memory, by id
+  SweepTurns turns_;
   std::list<Running> running_;
   SweepOutcome outcome_;
   bool is_stopping_ = false, has_warned_of_memory_ = false;

@@ -34,6 +34,8 @@ struct SweepOutcome {
   std::size_t done_before = 0, computed = 0, by_others = 0;  ///< runs
   std::vector<SweepFailure> failures;
   std::vector<std::size_t> not_done;  ///< with fail_fast: interrupted, or not started
+  std::size_t left_out = 0;           ///< by halving
+  std::size_t over_budget = 0;        ///< not started as the plan's hours were over
 };
 
 /// Threads of each run: what the plan says, or the share of a job.
@@ -42,9 +44,9 @@ int sweep_threads(const SweepPlan& plan, const SweepLaunch& launch);
 /// Runs at once by jobs and threads.
 int sweep_jobs(const SweepPlan& plan, const SweepLaunch& launch);
 
-/// Computes all runs of a plan that are not done. A run that another launcher computes is waited for. A run that was
-/// ended by a signal, or could not be started, gets the line of its attempts that it could not write itself.
-/// Throws Interrupted after what was running has saved its state.
+/// Computes all runs of a plan that are not done and whose turn comes, until its hours are over. A run that another
+/// launcher computes is waited for. A run that was ended by a signal, or could not be started, gets the line of its
+/// attempts that it could not write itself. Throws Interrupted after what was running has saved its state.
 SweepOutcome run_sweep_locally(const SweepPaths& paths, const SweepPlan& plan, const SweepLaunch& launch);
 
 }  // namespace hsi4d

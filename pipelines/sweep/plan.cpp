@@ -34,7 +34,8 @@ struct Combination {
   SweepRun run;
   const SweepBlock* block = nullptr;
   const SweepClip* clip = nullptr;
-  std::vector<const std::vector<SweepSetting>*> layers;  ///< in the order in which they are laid over the base
+  std::vector<const std::vector<SweepSetting>*> layers;    ///< in the order in which they are laid over the base
+  std::vector<const std::vector<SweepSetting>*> searched;  ///< of them, those that a clip's come before
   std::optional<std::int64_t> seed;
 };
 
@@ -64,11 +65,21 @@ std::vector<Combination> combinations_of(const SweepBlock& block) {
   first.run.block = block.name;
   first.block = &block;
   first.layers = {&block.set};
-  std::vector<Combination> all = crossed({first}, block.clips.size(), [&](Combination& c, std::size_t i) {
+  std::vector<Combination> all = {first};
+  for (const SweepAxis& axis : block.searched) {  // the slowest, so that a search that ends early has whole points
+    const bool is_rungs = axis.keys == block.search->rungs.keys;
+    all = crossed(all, axis.points.size(), [&](Combination& c, std::size_t i) {
+      remember_values(axis.points[i], c.run);
+      c.searched.push_back(&axis.points[i]);
+      if (is_rungs) c.run.rung = i;
+    });
+  }
+  all = crossed(all, block.clips.size(), [&](Combination& c, std::size_t i) {
     c.clip = &block.clips[i];
     c.run.clip = c.clip->name;
     c.layers.push_back(&c.clip->set);
   });
+  for (Combination& c : all) c.layers.insert(c.layers.end(), c.searched.begin(), c.searched.end());
   all = crossed(all, block.ablations.size(), [&](Combination& c, std::size_t i) {
     c.run.ablation = block.ablations[i].name;  // its settings are laid after those of the grid
   });
@@ -248,12 +259,23 @@ std::string identity_text(const std::string& config, const std::string& name, bo
   return to_json(identity_of(parse_json_text(config, name), is_made));
 }
 
+PlannedSearch planned(const SweepSearch& search, const std::string& block) {
+  PlannedSearch plan{block, search.metric, {}, {}, search.factor};
+  for (const SweepRange& range : search.over) plan.over.push_back({sweep_key(range.key), range.is_log});
+  for (const std::string& key : search.rungs.keys) plan.rung_keys.push_back(sweep_key(key));
+  return plan;
+}
+
 class Planner {
  public:
   Planner(const SweepFile& sweep, const std::vector<LossDescription>& losses) : sweep_(sweep), losses_(losses) {}
 
   SweepPlan plan() {
-    SweepPlan plan{sweep_.name, {}, {}, sweep_.threads, sweep_.memory_mb, sweep_.slurm};
+    SweepPlan plan{sweep_.name, {}, {}, sweep_.threads, sweep_.memory_mb, sweep_.slurm, sweep_.hours};
+    plan.memory_retries = sweep_.memory_retries;
+    for (const SweepBlock& block : sweep_.blocks) {
+      if (block.search) plan.searches.push_back(planned(*block.search, block.name));
+    }
     std::vector<Combination> all = combinations_of(sweep_);
     for (Combination& combination : all) {
       try {
@@ -419,6 +441,7 @@ class Planner {
       }
     }
     const SweepRun& first = plan.runs.front();
+    if (search_of(plan, first) != nullptr) return compare;  // no point of a search is what others are measured by
     if (!first.ablation.empty()) compare.emplace_back("ablation", first.ablation);
     compare.insert(compare.end(), first.values.begin(), first.values.end());
     return compare;
@@ -453,7 +476,17 @@ std::string last_parts(const std::string& key, std::size_t count) {
   return at == std::string::npos ? key : key.substr(at + 1);
 }
 
-std::string plain_value(const std::string& json) {
+}  // namespace
+
+const PlannedSearch* search_of(const SweepPlan& plan, const SweepRun& run) {
+  const auto is_its = [&run](const PlannedSearch& search) { return search.block == run.block; };
+  const auto found = std::find_if(plan.searches.begin(), plan.searches.end(), is_its);
+  return found == plan.searches.end() ? nullptr : &*found;
+}
+
+std::string short_sweep_key(const std::string& key) { return last_parts(key, 1); }
+
+std::string plain_sweep_value(const std::string& json) {
   constexpr std::size_t kMost = 40;
   std::string text = json;
   if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
@@ -461,9 +494,18 @@ std::string plain_value(const std::string& json) {
   return is_plain_text(text) ? text : with_escapes(text);
 }
 
-}  // namespace
-
-std::string short_sweep_key(const std::string& key) { return last_parts(key, 1); }
+std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys, std::size_t least) {
+  std::vector<std::string> names;
+  for (const std::string& key : keys) {
+    std::size_t count = least;
+    const auto is_like = [&](const std::string& other) {
+      return other != key && last_parts(other, count) == last_parts(key, count);
+    };
+    while (last_parts(key, count) != key && std::any_of(keys.begin(), keys.end(), is_like)) ++count;
+    names.push_back(last_parts(key, count));
+  }
+  return names;
+}
 
 std::vector<SweepLabelPart> sweep_label_parts(const SweepRun& run) {
   std::vector<SweepLabelPart> parts;
@@ -471,14 +513,11 @@ std::vector<SweepLabelPart> sweep_label_parts(const SweepRun& run) {
        {std::pair<const char*, std::string>{"block", run.block}, {"clip", run.clip}, {"ablation", run.ablation}}) {
     if (!name.empty()) parts.push_back({axis, name});
   }
-  for (const auto& [key, value] : run.values) {
-    std::size_t count = 1;
-    const auto is_like = [&, own = key](const auto& other) {
-      return other.first != own && last_parts(other.first, count) == last_parts(own, count);
-    };
-    while (last_parts(key, count) != key && std::any_of(run.values.begin(), run.values.end(), is_like)) ++count;
-    parts.push_back({key, last_parts(key, count) + " " + plain_value(value)});
-  }
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : run.values) keys.push_back(key);
+  const std::vector<std::string> names = short_sweep_keys(keys);
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    parts.push_back({keys[i], names[i] + " " + plain_sweep_value(run.values[i].second)});
   if (!run.seed.empty()) parts.push_back({"seed", "seed " + run.seed});
   return parts;
 }

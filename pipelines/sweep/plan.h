@@ -16,9 +16,25 @@ namespace hsi4d {
 struct SweepRun {
   std::string id;  ///< of its run folder: a hash of the resolved config without what changes no result
   std::string block, clip, ablation, seed;
-  std::vector<std::pair<std::string, std::string>> values;  ///< of grid and zip: key and JSON text
-  std::string dataset;  ///< id of the generated dataset; empty: the config names data
-  std::string config;   ///< its text, resolved; empty in a plan that was read from a folder
+  std::vector<std::pair<std::string, std::string>> values;  ///< of search, grid and zip: key and JSON text
+  std::string dataset;   ///< id of the generated dataset; empty: the config names data
+  std::string config;    ///< its text, resolved; empty in a plan that was read from a folder
+  std::size_t rung = 0;  ///< of successive halving
+};
+
+/// A setting that a search is over.
+struct SearchedKey {
+  std::string key;
+  bool is_log = false;
+};
+
+/// What a search of a plan is about.
+struct PlannedSearch {
+  std::string block;  ///< whose runs are its own
+  std::string metric;
+  std::vector<SearchedKey> over;
+  std::vector<std::string> rung_keys;  ///< settings of the rungs of successive halving
+  int factor = 2;                      ///< of so many points of a rung one goes on
 };
 
 /// A sweep, ready to be carried out.
@@ -29,7 +45,13 @@ struct SweepPlan {
   int threads = 0;                                           ///< of each run; 0: not said
   double memory_mb = 0;                                      ///< of each run; 0: not said
   SweepSlurm slurm;
+  double hours = 0;  ///< of all runs, added up: none is started once they are over; 0: no limit
+  std::vector<PlannedSearch> searches = {};
+  int memory_retries = 0;  ///< of a run that is killed for memory, each with twice as much
 };
+
+/// The search that a run is of, or null.
+const PlannedSearch* search_of(const SweepPlan& plan, const SweepRun& run);
 
 /// What a run is called on an axis: "no_color_net" on "ablation", "iterations 100" on that key, "seed 1" on "seed".
 struct SweepLabelPart {
@@ -47,6 +69,13 @@ SweepRun without_repetition(SweepRun run);
 
 /// The last parts of keys that tell them apart: "iterations".
 std::string short_sweep_key(const std::string& key);
+
+/// A value as labels show it: words without quotes, long ones by their end.
+std::string plain_sweep_value(const std::string& json);
+
+/// So many last parts of each key as tell it from the others: "camera.lr", "body_pose.lr", "blur".
+/// @param least  parts
+std::vector<std::string> short_sweep_keys(const std::vector<std::string>& keys, std::size_t least = 1);
 
 /// Puts the combinations of a sweep together and reads each as a run would. Throws one UserError with every problem, of
 /// the file, its configs and its combinations, with the runs that it is in.

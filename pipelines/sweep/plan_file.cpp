@@ -3,6 +3,7 @@
 
 #include "core/check.h"
 #include "core/json_text.h"
+#include "pipelines/metrics/metric_facts.h"
 #include "pipelines/sweep/plan.h"
 
 namespace hsi4d {
@@ -79,6 +80,48 @@ SweepSlurm slurm_of(const ConfigValue& tree) {
   return slurm;
 }
 
+ConfigValue search_json(const PlannedSearch& search) {
+  ConfigValue object = ConfigValue::make_object();
+  if (!search.block.empty()) object.add("block", ConfigValue::make_string(search.block));
+  object.add("metric", ConfigValue::make_string(search.metric));
+  ConfigValue over = ConfigValue::make_object();
+  for (const auto& [key, is_log] : search.over) over.add(key, ConfigValue::make_string(is_log ? "log" : "linear"));
+  object.add("over", std::move(over));
+  if (search.rung_keys.empty()) return object;
+  ConfigValue rungs = ConfigValue::make_array();
+  for (const std::string& key : search.rung_keys) rungs.items.push_back(ConfigValue::make_string(key));
+  object.add("rungs", std::move(rungs));
+  object.add("factor", ConfigValue::make_integer(search.factor));
+  return object;
+}
+
+PlannedSearch search_of_json(const ConfigValue& object, const std::string& in) {
+  check_kind(object, Kind::kObject, in);
+  PlannedSearch search;
+  search.block = string_member(object, "block");
+  search.metric = member_of(object, "metric", in, Kind::kString).text;
+  if (find_metric_facts(search.metric) == nullptr)
+    fail_at(object, child_pointer(in, "metric"), json_string(search.metric) + " is no metric");
+  for (const auto& [key, scale] : words_of(object, "over", in)) search.over.push_back({key, scale == "log"});
+  if (find_member(object, "rungs") == nullptr) return search;
+  for (const ConfigValue& key : member_of(object, "rungs", in, Kind::kArray).items) {
+    check_kind(key, Kind::kString, child_pointer(in, "rungs"));
+    search.rung_keys.push_back(key.text);
+  }
+  search.factor = integer_of(object, "factor", in);
+  if (search.factor < 2) fail_at(object, child_pointer(in, "factor"), "is below 2");
+  return search;
+}
+
+/// A number that is not negative, 0 where there is none.
+double hours_of(const ConfigValue& tree) {
+  const ConfigValue* const member = find_member(tree, "hours");
+  if (member == nullptr) return 0;
+  const double hours = number_of(*member, "/hours");
+  if (hours < 0) fail_at(*member, "/hours", shown(*member) + " is below 0");
+  return hours;
+}
+
 bool is_id(const std::string& text) {
   return text.size() == 16 &&
          std::all_of(text.begin(), text.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
@@ -93,6 +136,7 @@ SweepRun run_of(const ConfigValue& object, const std::string& in) {
   run.clip = string_member(object, "clip");
   run.ablation = string_member(object, "ablation");
   run.seed = string_member(object, "seed");
+  if (find_member(object, "rung") != nullptr) run.rung = static_cast<std::size_t>(integer_of(object, "rung", in));
   run.values = words_of(object, "values", in);
   run.dataset = string_member(object, "dataset");
   if (!run.dataset.empty() && !is_id(run.dataset))
@@ -110,8 +154,13 @@ std::string sweep_plan_json(const SweepPlan& plan) {
   tree.add("name", ConfigValue::make_string(plan.name));
   tree.add("threads", ConfigValue::make_integer(plan.threads));
   tree.add("memory_mb", ConfigValue::make_number(plan.memory_mb));
+  if (plan.hours > 0) tree.add("hours", ConfigValue::make_number(plan.hours));
+  if (plan.memory_retries > 0) tree.add("memory_retries", ConfigValue::make_integer(plan.memory_retries));
   tree.add("slurm", slurm_json(plan.slurm));
   tree.add("compare", words_json(plan.compare));
+  ConfigValue searches = ConfigValue::make_array();
+  for (const PlannedSearch& search : plan.searches) searches.items.push_back(search_json(search));
+  if (!searches.items.empty()) tree.add("searches", std::move(searches));
   ConfigValue runs = ConfigValue::make_array();
   for (const SweepRun& run : plan.runs) {
     ConfigValue one = ConfigValue::make_object();
@@ -122,6 +171,7 @@ std::string sweep_plan_json(const SweepPlan& plan) {
     for (const auto& [key, name] : names) {
       if (!name.empty()) one.add(key, ConfigValue::make_string(name));
     }
+    if (run.rung > 0) one.add("rung", ConfigValue::make_integer(static_cast<std::int64_t>(run.rung)));
     if (!run.values.empty()) one.add("values", words_json(run.values));
     if (!run.dataset.empty()) one.add("dataset", ConfigValue::make_string(run.dataset));
     runs.items.push_back(std::move(one));
@@ -141,8 +191,18 @@ SweepPlan parse_sweep_plan(const std::string& text, const std::string& name) {
   const ConfigValue& memory = member_of(tree, "memory_mb", "", Kind::kNumber);
   plan.memory_mb = number_of(memory, "/memory_mb");
   if (plan.memory_mb < 0) fail_at(memory, "/memory_mb", shown(memory) + " is below 0");
+  plan.hours = hours_of(tree);
+  if (find_member(tree, "memory_retries") != nullptr) {
+    plan.memory_retries = integer_of(tree, "memory_retries", "");
+    if (plan.memory_retries > kMostMemoryRetries)
+      fail_at(tree, "/memory_retries", "is above " + std::to_string(kMostMemoryRetries));
+  }
   plan.slurm = slurm_of(tree);
   plan.compare = words_of(tree, "compare", "");
+  if (find_member(tree, "searches") != nullptr) {
+    for (const ConfigValue& search : member_of(tree, "searches", "", Kind::kArray).items)
+      plan.searches.push_back(search_of_json(search, "/searches"));
+  }
   const ConfigValue& runs = member_of(tree, "runs", "", Kind::kArray);
   for (std::size_t i = 0; i < runs.items.size(); ++i)
     plan.runs.push_back(run_of(runs.items[i], child_pointer("/runs", std::to_string(i))));

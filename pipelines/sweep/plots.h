@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipelines/sweep/results.h"
+#include "pipelines/sweep/search_results.h"
 
 namespace hsi4d {
 
@@ -33,7 +34,18 @@ std::string difference_plot(const SweepResults& results, const MetricFacts& metr
 /// A metric over the numbers of an axis, a line for each combination of all else; empty where there are not two.
 std::string axis_plot(const SweepResults& results, const std::string& key, const MetricFacts& metric);
 
-/// Keys of axes with at least two numbers.
+/// A column for each setting of a search and for the metric in each rung, a line for each point through its values: the
+/// best one's is thick and blue, the last one's is orange. The best of the metric is at the top.
+std::string parallel_plot(const SearchResults& found);
+
+/// How much each setting of a search matters to a metric: a bar, in colour where it is more than the mark, which chance
+/// rarely passes. Empty where there are too few points.
+std::string importance_plot(const SweepResults& results, const SearchResults& found, const MetricFacts& metric);
+
+/// The search's metric in the first rung over a setting that is a number: a dot a point. Empty for others.
+std::string setting_plot(const SearchResults& found, std::size_t key);
+
+/// Keys of axes with at least two numbers, but those of searches.
 std::vector<std::string> number_axes(const SweepPlan& plan);
 
 }  // namespace hsi4d

@@ -1,5 +1,6 @@
 #include "pipelines/sweep/report.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/file.h"
@@ -23,7 +24,8 @@ std::string metric_plots(const SweepResults& results, const std::string& title, 
 
 std::string header_section(const SweepResults& results) {
   const std::size_t done = results.count(SweepRunState::kDone), failed = results.count(SweepRunState::kFailed);
-  const std::string state = done == results.rows.size() ? "done" : failed > 0 ? "failed" : "running";
+  const std::size_t left_out = results.count(SweepRunState::kLeftOut);
+  const std::string state = done + left_out == results.rows.size() ? "done" : failed > 0 ? "failed" : "running";
   const std::string shown = state == "running" ? "not complete" : state == "failed" ? "with failures" : state;
   double seconds = 0;
   for (const SweepRow& row : results.rows) {
@@ -72,21 +74,58 @@ std::string axes_sections(const SweepResults& results) {
   return text;
 }
 
+/// What each search has found.
+std::string search_sections(const SweepResults& results) {
+  std::string text;
+  for (const SearchResults& found : search_results(results)) {
+    const MetricFacts& facts = *find_metric_facts(found.search->metric);
+    const std::string of = found.label.empty() ? "" : ", " + found.label;
+    text += table_section(best_points_table(found));
+    text += "<section><h2>Points of the search" + html_escape(of) +
+            "</h2>\n<p class=\"caption\">A line is a point, through its settings to its " + html_escape(facts.label) +
+            (found.rungs > 1 ? " in each rung that it has come to" : "") +
+            ", of which the best is at the top. The thick line is the best point; blue ones are good, orange ones "
+            "bad.</p>\n<div class=\"card\">" +
+            parallel_plot(found) + "</div></section>\n";
+    std::vector<std::pair<std::string, std::string>> settings;
+    for (std::size_t key = 0; key < found.search->over.size(); ++key)
+      settings.emplace_back(found.search->over[key].key, setting_plot(found, key));
+    text += plots_section(std::string(facts.label) + " by setting" + of,
+                          std::string(found.rungs > 1 ? "Of the first rung, where all points are. " : "") +
+                              "Dots are points in the same colours.",
+                          settings);
+    text +=
+        metric_plots(results, "What matters" + of,
+                     "How much of the variance of a metric's ranks a setting alone explains, beyond what it would "
+                     "by chance; coloured where it is more than the mark, which 95 % of random orders do not reach.",
+                     [&](const MetricFacts& metric) { return importance_plot(results, found, metric); });
+  }
+  return text;
+}
+
+/// False where every row is a point of a search, which plots of its own show.
+bool has_rows_of_others(const SweepResults& results) {
+  return std::any_of(results.groups.begin(), results.groups.end(), [&results](const SweepGroup& group) {
+    return search_of(results.plan, results.plan.runs[group.rows.front()]) == nullptr;
+  });
+}
+
 }  // namespace
 
 std::string sweep_page(const SweepResults& results) {
   std::string page = header_section(results);
   if (results.count(SweepRunState::kDone) > 0) {
-    page += table_section(mean_table(results)) + table_section(difference_table(results));
+    page += search_sections(results) + table_section(mean_table(results)) + table_section(difference_table(results));
     const std::string reference = reference_text(results.plan);
     page += metric_plots(results, "Differences to " + reference,
                          "Dots are pairs of runs, the mark their mean, the bar its 95 % interval; coloured where that "
                          "does not contain 0 and there are at least six pairs.",
                          [&](const MetricFacts& metric) { return difference_plot(results, metric); });
     page += axes_sections(results);
-    page += metric_plots(results, "Runs by metric",
-                         "Dots are runs, the mark their mean, the bar the standard deviation over the seeds.",
-                         [&](const MetricFacts& metric) { return mean_plot(results, metric); });
+    if (has_rows_of_others(results))
+      page += metric_plots(results, "Runs by metric",
+                           "Dots are runs, the mark their mean, the bar the standard deviation over the seeds.",
+                           [&](const MetricFacts& metric) { return mean_plot(results, metric); });
     if (results.clips.size() > 1) {
       for (const std::string& clip : results.clips) page += table_section(mean_table(results, &clip));
     }

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/file.h"
+#include "pipelines/sweep/halving.h"
 
 namespace hsi4d {
 namespace {
@@ -65,10 +66,10 @@ std::vector<std::string> warnings_of(const std::string& log) {
   return warnings;
 }
 
-SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& run) {
+SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& run, SweepRunState state) {
   SweepRow row;
   row.index = index;
-  row.state = sweep_run_state(paths, run.id);
+  row.state = state;
   std::set<std::string> programs;
   for (SweepAttempt& attempt : read_attempts(paths, run.id)) {
     row.starts += attempt.event == "start" ? 1 : 0;
@@ -151,6 +152,10 @@ SweepResults sweep_results_of(SweepPlan plan, std::vector<SweepRow> rows) {
       results.clips.push_back(run.clip);
   }
   results.groups = groups_of(plan);
+  std::erase_if(results.groups, [&rows](const SweepGroup& group) {
+    return std::all_of(group.rows.begin(), group.rows.end(),
+                       [&rows](std::size_t row) { return rows[row].state == SweepRunState::kLeftOut; });
+  });
   results.metrics = metrics_of(rows);
   results.plan = std::move(plan);
   results.rows = std::move(rows);
@@ -160,7 +165,8 @@ SweepResults sweep_results_of(SweepPlan plan, std::vector<SweepRow> rows) {
 SweepResults read_sweep_results(const SweepPaths& paths) {
   SweepPlan plan = read_sweep_plan(paths);
   std::vector<SweepRow> rows;
-  for (std::size_t i = 0; i < plan.runs.size(); ++i) rows.push_back(read_row(paths, i, plan.runs[i]));
+  const std::vector<SweepRunState> states = sweep_run_states(paths, plan);
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) rows.push_back(read_row(paths, i, plan.runs[i], states[i]));
   return sweep_results_of(std::move(plan), std::move(rows));
 }
 

@@ -32,6 +32,32 @@ constexpr const char* kBlockProperties = R"({
     "anyOf": [
     {"type": "object", "additionalProperties": {"type": "array", "minItems": 1}},
     {"type": "array", "items": {"type": "object", "additionalProperties": {"type": "array", "minItems": 1}}}]},
+  "search": {"description": "Points of a space: settings that are tried until the runs are used up", "anyOf": [
+    {"type": "object", "additionalProperties": false},
+    {"type": "object", "properties": {
+    "metric": {"description": "What is searched for, by its name in summary.json: the best of it", "type": "string"},
+    "method": {"description": "How points are chosen: evenly, or independently of each other",
+               "enum": ["sobol", "random"], "default": "sobol"},
+    "seed": {"description": "Of the points", "type": "integer", "minimum": 0, "default": 0},
+    "runs": {"description": "The most runs, of all points, clips and seeds together", "type": "integer",
+             "minimum": 1, "maximum": 100000},
+    "over": {"description": "{KEY: [choices]} or {KEY: {from, to, scale, integer}}", "type": "object",
+      "additionalProperties": {"anyOf": [
+      {"type": "array", "minItems": 2},
+      {"type": "object", "properties": {
+        "from": {"description": "The least value", "type": "number", "minimum": -1e15, "maximum": 1e15},
+        "to": {"description": "The largest value", "type": "number", "minimum": -1e15, "maximum": 1e15},
+        "scale": {"description": "Of equal differences as many values, or of equal ratios", "enum": ["linear", "log"],
+                  "default": "linear"},
+        "integer": {"description": "Whole numbers alone, both ends among them", "type": "boolean", "default": false}},
+       "required": ["from", "to"], "additionalProperties": false}]}},
+    "halving": {"description": "Rungs of successive halving, the cheapest first", "type": "object", "properties": {
+      "rungs": {"description": "{KEY: [values]}, a value a rung", "type": "object",
+                "additionalProperties": {"type": "array", "minItems": 2}},
+      "factor": {"description": "Of so many points of a rung the best goes on", "type": "integer", "minimum": 2,
+                 "maximum": 1000, "default": 2}},
+      "required": ["rungs"], "additionalProperties": false}},
+    "required": ["metric", "runs", "over"], "additionalProperties": false}]},
   "skip": {"description": "[{KEY: value}]: combinations that are left out", "type": "array",
     "items": {"type": "object"}, "minItems": 1},
   "only": {"description": "[{KEY: value}]: the only combinations that stay", "type": "array",

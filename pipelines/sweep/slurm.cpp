@@ -12,6 +12,7 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "optim/checkpoint.h"
+#include "pipelines/sweep/halving.h"
 
 namespace hsi4d {
 namespace {
@@ -180,9 +181,36 @@ std::string script(const SweepPaths& paths, const std::string& name, const std::
   return file;
 }
 
-/// @param after  another array that has to be over before, "": none
+/// ":ID:ID", as --dependency takes it.
+std::string job_list(const std::set<std::string>& jobs) {
+  std::string text;
+  for (const std::string& job : jobs) text += ":" + job;
+  return text;
+}
+
+/// How often a run has ended without a word: more starts than ends, and nobody computes it.
+int times_lost(const SweepPaths& paths, const std::string& id) {
+  int lost = 0;
+  for (const SweepAttempt& attempt : read_attempts(paths, id)) lost += attempt.event == "start" ? 1 : -1;
+  return std::max(0, lost);
+}
+
+/// Runs by the rung of successive halving, of which each waits for those below, and how often their memory is doubled.
+std::map<std::pair<std::size_t, int>, std::vector<std::size_t>> array_groups(const SweepPaths& paths,
+                                                                             const SweepPlan& plan,
+                                                                             const std::vector<std::size_t>& runs) {
+  std::map<std::pair<std::size_t, int>, std::vector<std::size_t>> groups;
+  for (const std::size_t run : runs) {
+    const int doubled = std::min(plan.memory_retries, times_lost(paths, plan.runs[run].id));
+    groups[{plan.runs[run].rung, doubled}].push_back(run);
+  }
+  return groups;
+}
+
+/// @param after  other arrays that have to be over before
 std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const ArrayPart& part,
-                         const std::string& program, int jobs, int threads, const std::string& after) {
+                         const std::string& program, int jobs, int threads, const std::set<std::string>& after,
+                         int doubled) {
   const std::string whole = slurm_folder(paths).parent_path().string();
   const ArraySource source = {fs::path(paths.frozen_plan(plan)).filename().string(), part.first};
   const std::string first = std::to_string(part.first);
@@ -190,8 +218,8 @@ std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const A
   const std::string commands = std::string(kKeepWarning) + "exec $hold " + quoted(program) + " run-one " +
                                quoted(whole + "/plans/" + source.plan_file) + " \"" + index + "\" --out " +
                                quoted(whole) + " --threads " + std::to_string(threads) + " --requeue";
-  std::vector<std::string> options = array_options(paths, plan, part.runs, jobs, threads, part.first);
-  if (!after.empty()) options.push_back("--dependency=afterany:" + after);
+  std::vector<std::string> options = array_options(paths, plan, part.runs, jobs, threads, part.first, doubled);
+  if (!after.empty()) options.push_back("--dependency=afterany" + job_list(after));
   const std::string name = part.first == 0 ? "run.sh" : "run_from_" + first + ".sh";
   const std::string job = submit(std::move(options), script(paths, name, commands));
   const std::string known = (slurm_folder(paths) / "jobs.txt").string();
@@ -203,16 +231,20 @@ std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const A
 std::string submit_results(const SweepPaths& paths, const SweepPlan& plan, const std::set<std::string>& arrays,
                            const std::string& program) {
   const fs::path folder = slurm_folder(paths);
-  std::string after;
-  for (const std::string& array : arrays) after += ":" + array;
   std::vector<std::string> options = {"--job-name=" + plan.name + "-results",
-                                      "--comment=" + job_comment(folder, kResultsMark), "--dependency=afterany" + after,
+                                      "--comment=" + job_comment(folder, kResultsMark),
+                                      "--dependency=afterany" + job_list(arrays),
                                       "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
   if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);
   options.insert(options.end(), plan.slurm.options.begin(), plan.slurm.options.end());
   return submit(
       std::move(options),
       script(paths, "results.sh", "exec " + quoted(program) + " report " + quoted(folder.parent_path().string())));
+}
+
+/// What a run gets, MB; 0: what the partition gives.
+double known_memory_mb(const SweepPlan& plan) {
+  return plan.slurm.memory_mb > 0 ? plan.slurm.memory_mb : plan.memory_mb;
 }
 
 int most_at_once(const SweepPlan& plan, int jobs) { return jobs > 0 ? jobs : plan.slurm.at_once; }
@@ -249,7 +281,8 @@ std::string array_text(const std::vector<std::size_t>& indices) {
 }
 
 std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan& plan,
-                                       const std::vector<std::size_t>& runs, int jobs, int threads, std::size_t first) {
+                                       const std::vector<std::size_t>& runs, int jobs, int threads, std::size_t first,
+                                       int doubled) {
   const SweepSlurm& slurm = plan.slurm;
   const int at_once = most_at_once(plan, jobs);
   std::vector<std::size_t> tasks = runs;
@@ -265,7 +298,7 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
       "--ntasks=1",
       "--cpus-per-task=" + std::to_string(threads),
       "--signal=B:USR1@" + std::to_string(slurm.grace_s)};
-  const double memory = slurm.memory_mb > 0 ? slurm.memory_mb : plan.memory_mb;
+  const double memory = std::ldexp(known_memory_mb(plan), doubled);
   if (memory > 0) options.push_back("--mem=" + std::to_string(static_cast<long>(std::ceil(memory))) + "M");
   if (!slurm.time.empty()) options.push_back("--time=" + slurm.time);
   if (!slurm.partition.empty()) options.push_back("--partition=" + slurm.partition);
@@ -275,11 +308,17 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
 
 SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
                        int threads) {
+  if (plan.memory_retries > 0 && known_memory_mb(plan) == 0)
+    throw UserError(
+        paths.folder.string() +
+        ": memory_retries doubles what a run gets, and the sweep names no memory_mb, of its own or of slurm");
   const SweepFolderLock lock(paths);  // nobody else submits
   const fs::path folder = slurm_folder(paths);
   const QueuedJobs queued = queued_jobs(folder);
   SlurmJobs submitted;
+  const std::vector<SweepRunState> states = sweep_run_states(paths, plan);
   for (const std::size_t index : distinct_runs(plan)) {
+    if (states[index] == SweepRunState::kLeftOut) continue;
     if (is_sweep_run_whole(paths, plan.runs[index].id)) continue;
     if (queued.runs.contains(plan.runs[index].id)) {
       ++submitted.queued;
@@ -288,12 +327,18 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
     }
   }
   std::set<std::string> arrays = queued.arrays;
-  for (const ArrayPart& part : submitted.runs.empty() ? std::vector<ArrayPart>() : array_parts(submitted.runs)) {
-    // The most at once are those of an array: with such a bound the next one waits for the one before.
-    const bool waits = most_at_once(plan, jobs) > 0 && !submitted.arrays.empty();
-    submitted.arrays.push_back(
-        submit_array(paths, plan, part, program, jobs, threads, waits ? submitted.arrays.back() : ""));
-    arrays.insert(submitted.arrays.back());
+  std::set<std::string> below;
+  std::size_t rung = 0;
+  for (const auto& [group, runs] : array_groups(paths, plan, submitted.runs)) {
+    if (group.first > rung) below = arrays;
+    rung = group.first;
+    for (const ArrayPart& part : array_parts(runs)) {
+      // The most at once are those of an array: with such a bound the next one waits for the one before.
+      std::set<std::string> after = below;
+      if (most_at_once(plan, jobs) > 0 && !submitted.arrays.empty()) after.insert(submitted.arrays.back());
+      submitted.arrays.push_back(submit_array(paths, plan, part, program, jobs, threads, after, group.second));
+      arrays.insert(submitted.arrays.back());
+    }
   }
   const bool has_results_of_all = queued.has_results && submitted.arrays.empty();
   if (!arrays.empty() && !has_results_of_all) submitted.results = submit_results(paths, plan, arrays, program);

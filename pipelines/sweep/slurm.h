@@ -27,17 +27,21 @@ std::string array_text(const std::vector<std::size_t>& indices);
 /// @param jobs     the most runs at once; 0: what the plan says
 /// @param threads  of each run
 /// @param first    the run that is task 0
+/// @param doubled  how often the memory of a run is doubled, after it was killed for it
 std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan& plan,
                                        const std::vector<std::size_t>& runs, int jobs, int threads,
-                                       std::size_t first = 0);
+                                       std::size_t first = 0, int doubled = 0);
 
 /// Submits the runs of a plan that are neither done nor in the queue already, and the job for the results where none is
 /// in the queue. What is in the queue is told by the comments of its jobs and by jobs.txt, so that nothing is submitted
 /// twice after a kill at any moment. More runs than Slurm takes in an array (MaxArraySize) are several, which wait for
-/// each other where there is a bound to the runs at once. A run is put into the queue again when its time is up (its
-/// state saved before) or its node is lost, and then goes on.
+/// each other where there is a bound to the runs at once; so are the rungs of successive halving, each of which waits
+/// for those below. A run is put into the queue again when its time is up (its state saved before) or its node is lost,
+/// and then goes on.
 /// @param program  hsi4d, at the place where the nodes have it
-/// Throws UserError with what Slurm says.
+/// A run that has ended without a word, killed for memory perhaps, gets twice as much for each time, up to the plan's
+/// memory_retries times.
+/// Throws UserError with what Slurm says, and where memory is to be doubled and not said.
 SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
                        int threads);
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/text.h"
+#include "pipelines/sweep/search_results.h"
 
 namespace hsi4d {
 namespace {
@@ -100,8 +101,8 @@ std::string reference_text(const SweepPlan& plan) {
 std::string progress_text(const SweepResults& results) {
   std::string text = std::to_string(results.rows.size()) + (results.rows.size() == 1 ? " run: " : " runs: ");
   bool is_first = true;
-  for (const SweepRunState state :
-       {SweepRunState::kDone, SweepRunState::kFailed, SweepRunState::kStarted, SweepRunState::kNew}) {
+  for (const SweepRunState state : {SweepRunState::kDone, SweepRunState::kFailed, SweepRunState::kStarted,
+                                    SweepRunState::kNew, SweepRunState::kLeftOut}) {
     const std::size_t count = results.count(state);
     if (count == 0) continue;
     text += (is_first ? "" : ", ") + std::to_string(count) + " " + std::string(sweep_run_state_name(state));
@@ -171,7 +172,7 @@ Table difference_table(const SweepResults& results) {
 std::string unfinished_text(const SweepResults& results) {
   std::string text;
   for (const SweepRow& row : results.rows) {
-    if (row.state == SweepRunState::kDone) continue;
+    if (row.state == SweepRunState::kDone || row.state == SweepRunState::kLeftOut) continue;
     std::string message = row.last ? row.last->message : "";
     std::replace(message.begin(), message.end(), '\n', ' ');
     text += "- run " + std::to_string(row.index) + ", " + sweep_label(results.plan.runs[row.index]) + ": " +
@@ -216,6 +217,7 @@ std::string sweep_markdown(const SweepResults& results) {
     text += section.empty() ? "" : "\n" + section;
   };
   if (results.count(SweepRunState::kDone) > 0) {
+    for (const SearchResults& found : search_results(results)) add(best_points_table(found));
     add(mean_table(results));
     add(difference_table(results));
     if (results.clips.size() > 1) {

@@ -21,6 +21,11 @@ constexpr std::string_view kBlocks =
  "blocks": [{"name": "one", "clips": {"b": {"config": "clip.json", "set": {"threads": 1}}}},
   {"name": "two", "clips": ["clip.json"], "seeds": {"dim": {"background": [0, 0, 0]}}, "zip": [{"seed_of": [1, 2]}]}]})";
 
+constexpr std::string_view kSearch =
+    R"({"base": "base.json", "seeds": 2, "hours": 1.5, "memory_retries": 1, "search": {"metric": "mpjpe_mm", "method": "random", "seed": 3, "runs": 30,
+ "over": {"stages.a.lr": {"from": 1e-3, "to": 0.1, "scale": "log"}, "b.frames": {"from": 2, "to": 30, "integer": true},
+  "color_net.use": ["on", "off", null]}, "halving": {"rungs": {"stages.a.iterations": [10, 20]}, "factor": 3}}})";
+
 /// The configs that a sweep's file names; what is in them is read with its runs.
 const Scratch& scratch() {
   static const Scratch made({{"base.json", bytes_of("{}")}, {"clip.json", bytes_of("{}")}});
@@ -35,14 +40,14 @@ void check_block(const SweepBlock& block) {
   HSI4D_CHECK(std::filesystem::exists(block.base), "a base that is not there");
   for (const SweepClip& clip : block.clips)
     HSI4D_CHECK(std::filesystem::exists(clip.config), "a clip that is not there");
-  for (const auto* const axes : {&block.grid, &block.zip}) {
-    for (const SweepAxis& axis : *axes) check_axis(axis);
-  }
+  for (const SweepAxis* const axis : setting_axes(block)) check_axis(*axis);
+  HSI4D_CHECK_EQ(block.search.has_value(), !block.searched.empty());
+  if (block.search) HSI4D_CHECK(sweep_combinations(block) >= 2, "a search of one point");
 }
 
 }  // namespace
 
-std::vector<Bytes> corpus() { return {bytes_of(kAxes), bytes_of(kBlocks)}; }
+std::vector<Bytes> corpus() { return {bytes_of(kAxes), bytes_of(kBlocks), bytes_of(kSearch)}; }
 
 bool accepts(std::span<const uint8_t> file) {
   return is_read([&] {

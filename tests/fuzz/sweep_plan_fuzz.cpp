@@ -17,7 +17,11 @@ SweepPlan small_plan() {
   plan.compare = {{"ablation", "plain"}, {"render.blur", "0.13"}};
   plan.runs.push_back(
       {"0123456789abcdef", "one", "walk", "plain", "0", {{"render.blur", "0.13"}}, "fedcba9876543210", ""});
-  plan.runs.push_back({"0123456789abcdee", "", "", "", "", {}, "", ""});
+  plan.runs.push_back({"0123456789abcdee", "", "", "", "", {}, "", "", 1});
+  plan.hours = 1.5;
+  plan.memory_retries = 1;
+  plan.searches = {{"one", "mpjpe_mm", {{"stages.a.lr", true}, {"color_net.use", false}}, {"last_frame"}, 3},
+                   {"", "ssim", {{"render.blur", false}}, {}, 2}};
   return plan;
 }
 

@@ -207,16 +207,43 @@ TEST_CASE("the schema of sweeps accepts those that are shipped and refuses what 
         R"("clips": {"a": "base.json", "b": {"config": "base.json", "set": {"render.blur": 1}}}})",
         R"("zip": [{"a": [1]}, {"b": [null, {}]}]})", R"("slurm": {"time": "1:00:00", "options": ["--nice"]}})",
         R"("blocks": [{}, {"name": "x", "grid": {"a": [1]}}], "compare": {"a": 1}})",
-        R"("ablations": {"whole": {}, "no": {"stages.camera": null}}, "skip": [{"ablation": "no"}]})"}) {
+        R"("ablations": {"whole": {}, "no": {"stages.camera": null}}, "skip": [{"ablation": "no"}]})",
+        R"("hours": 0.5, "memory_retries": 2,
+           "search": {"metric": "mpjpe_mm", "runs": 4, "over": {"a": {"from": 0, "to": 1}}}})",
+        R"("search": {"metric": "ssim", "runs": 4, "over": {"a": [1, 2, 3, 4]}},
+           "blocks": [{"name": "x", "search": {}}]})",
+        R"("search": {"metric": "ssim", "method": "random", "seed": 3, "runs": 9, "over": {"a": ["x", null],
+           "b": {"from": 1, "to": 9, "scale": "log", "integer": true}},
+           "halving": {"rungs": {"last_frame": [3, 7]}, "factor": 3}}})"}) {
     INFO(more);
     CHECK(validates(json::parse(base + more), schema));
     CHECK(reads(base + more));
   }
   for (const std::string more :
-       {R"("sedes": 3})", R"("seeds": 0})", R"("seeds": [-1]})", R"("seeds": true})", R"("clips": [{}]})",
-        R"("clips": {"a b": "base.json"}})", R"("clips": {"a": {"set": {}}}})", R"("grid": {"a": 1}})",
-        R"("grid": {"a": []}})", R"("zip": [[1]]})", R"("slurm": {"grace_s": 0}})", R"("blocks": [{"threads": 1}]})",
-        R"("ablations": {"a": 1}})", R"("skip": {"seed": 1}})", R"("name": "a b"})", R"("memory_mb": -1})"}) {
+       {R"("sedes": 3})",
+        R"("seeds": 0})",
+        R"("seeds": [-1]})",
+        R"("seeds": true})",
+        R"("clips": [{}]})",
+        R"("clips": {"a b": "base.json"}})",
+        R"("clips": {"a": {"set": {}}}})",
+        R"("grid": {"a": 1}})",
+        R"("grid": {"a": []}})",
+        R"("zip": [[1]]})",
+        R"("slurm": {"grace_s": 0}})",
+        R"("blocks": [{"threads": 1}]})",
+        R"("ablations": {"a": 1}})",
+        R"("skip": {"seed": 1}})",
+        R"("name": "a b"})",
+        R"("memory_mb": -1})",
+        R"("search": [1]})",
+        R"("search": {"runs": 4, "over": {"a": [1, 2]}}})",
+        R"("hours": -1})",
+        R"("memory_retries": -1})",
+        R"("search": {"metric": "ssim", "runs": 2, "method": "grid", "over": {"a": [1, 2]}}})",
+        R"("search": {"metric": "ssim", "runs": 2, "over": {"a": [1]}}})",
+        R"("search": {"metric": "ssim", "runs": 2, "over": {"a": {"from": 1}}}})",
+        R"("search": {"metric": "ssim", "runs": 9, "over": {"a": [1, 2, 3, 4]}, "halving": {"factor": 2}}})"}) {
     INFO(more);
     CHECK_FALSE(validates(json::parse(base + more), schema));
     CHECK_FALSE(reads(base + more));

@@ -104,6 +104,34 @@ TEST_CASE("a run that a signal ended gets the line that it could not write") {
   CHECK(sweep_run_state(sweep.paths(), sweep.id(0)) == SweepRunState::kFailed);
 }
 
+TEST_CASE("a run that is killed is computed again with twice the memory, so often as the sweep asks") {
+  StandIn sweep(3);
+  for (std::size_t i = 0; i < 3; ++i) sweep.prepare(i);
+  // Run 1 is killed twice.
+  sweep.act(
+      "[ $3 = 1 ] && echo x >> tries; "
+      "if [ $3 = 1 ] && [ $(wc -l < tries) -le 2 ]; then kill -9 $$; fi; cp -r ready/$3/. .; "
+      "echo '{\"event\": \"done\"}' >> made/attempts/00000000000000f$3.jsonl");
+  sweep.plan.memory_mb = 400;
+  sweep.plan.memory_retries = 2;
+  sweep.launch.memory_mb = 900;
+  const SweepOutcome outcome = sweep.run();
+  INFO(sweep.told);
+  CHECK(outcome.failures.empty());
+  CHECK(outcome.computed == 3);
+  CHECK_THAT(sweep.told, Contains("it is computed again, with 800 MB") &&
+                             Contains("it is computed again, with 1600 MB") &&
+                             Contains("a run takes up to 1600 MB, and there are 900 MB for all together"));
+}
+
+TEST_CASE("a run that is killed more often than it is computed again has failed") {
+  StandIn sweep(1);
+  sweep.act("kill -9 $$");
+  sweep.plan.memory_retries = 1;
+  CHECK(sweep.run().failures.size() == 1);
+  CHECK(read_attempts(sweep.paths(), sweep.id(0)).size() == 2);
+}
+
 TEST_CASE("what a run has noted of its failure is told and not noted again") {
   StandIn sweep(1);
   SweepClaim(sweep.paths(), sweep.id(0), {}).note("failed", "of long ago");

@@ -27,10 +27,15 @@ namespace {
 /// A sweep of four runs, and sbatch, squeue and scontrol as scripts: what sbatch is asked for is in sbatch.txt, what
 /// squeue tells in queue.txt, of a job that jobs.txt names in job.txt.
 struct StandInCluster {
-  MadeSweep made{[](SweepPlan& plan) { plan.runs.resize(4); }};
+  MadeSweep made;
   std::string path = std::getenv("PATH");
 
-  StandInCluster() {
+  /// @param change  what is other than that
+  explicit StandInCluster(const std::function<void(SweepPlan&)>& change = {})
+      : made([&change](SweepPlan& plan) {
+          plan.runs.resize(4);
+          if (change) change(plan);
+        }) {
     script("sbatch", "echo \"$*\" >> sbatch.txt; echo $((100 + $(wc -l < sbatch.txt)))");
     script("squeue",
            "case \"$*\" in *--me*) cat queue.txt;; *) [ -e job.txt ] && cat job.txt || "
@@ -207,6 +212,41 @@ TEST_CASE("a job that Slurm does not know has ended, and any other trouble is to
   CHECK(cluster.submit().runs.size() == 4);
   cluster.made.here().write("trouble.txt", "Unable to contact slurm controller\n");
   CHECK_THROWS_WITH(cluster.submit(), "squeue: ended with status 1:\nUnable to contact slurm controller");
+}
+
+TEST_CASE("the rungs of a search are arrays, of which each waits for those below") {
+  const StandInCluster cluster([](SweepPlan& plan) {
+    for (std::size_t i = 0; i < plan.runs.size(); ++i) plan.runs[i].rung = i / 2;
+  });
+  const SlurmJobs jobs = cluster.submit();
+  CHECK(jobs.arrays == std::vector<std::string>{"101", "102"});
+  CHECK_THAT(cluster.asked()[0], Contains("--array=0-1 ") && !Contains("--dependency"));
+  CHECK_THAT(cluster.asked()[1], Contains("--array=2-3 ") && Contains("--dependency=afterany:101 "));
+  CHECK_THAT(cluster.asked()[2], Contains("--dependency=afterany:101:102 "));
+}
+
+TEST_CASE("a run that was lost gets twice the memory where the sweep asks for that") {
+  const StandInCluster cluster([](SweepPlan& plan) {
+    plan.memory_mb = 300;
+    plan.memory_retries = 2;
+  });
+  const auto note = [&](std::size_t run, const char* event) {
+    SweepClaim(cluster.made.paths(), cluster.made.id(run), {}).note(event);
+  };
+  note(1, "start");
+  for (int i = 0; i < 3; ++i) note(2, "start");
+  note(3, "start");
+  note(3, "failed");  // it could tell why
+  CHECK(cluster.submit().arrays.size() == 3);
+  CHECK_THAT(cluster.asked()[0], Contains("--array=0,3 ") && Contains("--mem=300M "));
+  CHECK_THAT(cluster.asked()[1], Contains("--array=1 ") && Contains("--mem=600M "));
+  CHECK_THAT(cluster.asked()[2], Contains("--array=2 ") && Contains("--mem=1200M "));
+}
+
+TEST_CASE("memory that a sweep does not name cannot be doubled") {
+  const StandInCluster cluster([](SweepPlan& plan) { plan.memory_retries = 1; });
+  CHECK_THROWS_WITH(cluster.submit(),
+                    Contains("memory_retries doubles what a run gets, and the sweep names no memory_mb"));
 }
 
 TEST_CASE("a sweep that does not say a whole number of MB asks for enough") {
