@@ -65,14 +65,25 @@ compile() {
 # find_chromium: prints where a Chromium is, or nothing; the variable CHROMIUM names another than that in PATH.
 find_chromium() { command -v "${CHROMIUM:-}" chromium chromium-browser google-chrome 2>/dev/null | head -n 1; }
 
-# install_chromium [PACKAGE]...: Debian's, where there is none, with these packages; as root or through sudo.
+# install_debian PACKAGE...: as root or through sudo.
+install_debian() {
+  local apt=(env DEBIAN_FRONTEND=noninteractive apt-get -q -y)
+  if [[ $EUID -ne 0 ]]; then apt=(sudo "${apt[@]}"); fi
+  "${apt[@]}" update || echo "the package lists could not be refreshed; trying with those that are there" >&2
+  "${apt[@]}" install --no-install-recommends "$@"
+}
+
+# install_chromium [PACKAGE]...: Debian's, where there is none, with these packages.
 install_chromium() {
-  local as_root=()
   [[ -z $(find_chromium) ]] || return 0
-  if [[ $EUID -ne 0 ]]; then as_root=(sudo); fi
-  timed "install chromium" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get -q -y install --no-install-recommends chromium "$@" ||
+  timed "install chromium" install_debian chromium "$@" ||
     fail "there is no Chromium, and it cannot be installed (Debian package chromium); the variable CHROMIUM names one"
+}
+
+# provide PROGRAM PACKAGE: Debian's, where there is none.
+provide() {
+  if command -v "$1" >/dev/null; then return; fi
+  timed "install $1" install_debian "$2" || fail "there is no $1, and it cannot be installed (Debian package $2)"
 }
 
 # print_usage FILE: the comment at the top of a command.

@@ -96,8 +96,12 @@ PersonCamera look_for_person(const InitArguments& a, Keypoints keypoints, const 
 
 /// Where the person is first seen to stand.
 Vector2<double> first_place(const PersonCamera& found, const std::string& keypoints) {
-  for (const std::optional<Vector2<double>>& at : found.places) {
-    if (at) return *at;
+  for (std::size_t t = 0; t < found.places.size(); ++t) {
+    if (!found.places[t]) continue;
+    if (t > 0)
+      log_warning(keypoints + ": no ankles are on the ground in frame 0; the first state has the person of frame " +
+                  std::to_string(t));
+    return *found.places[t];
   }
   throw DataError(keypoints + ": the ankles are nowhere on the ground before the camera");
 }

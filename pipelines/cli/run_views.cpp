@@ -23,8 +23,22 @@ void check_is_done(const RunPaths& paths) {
   }
 }
 
+/// The avatar that the run found, or else that which it was given.
+std::string avatar_of(const RunPaths& paths, const RunConfig& config) {
+  return fs::exists(paths.avatar()) ? paths.avatar() : config.data.avatar.string();
+}
+
+/// The lens that the run's frames were seen through.
+Lens lens_of(const RunPaths& paths, const RunConfig& config) {
+  if (config.data.lens.estimate_k1)
+    throw UserError(paths.config() +
+                    ": /data/lens/k1: is \"estimate\", and what the run found is in its log.txt alone; a "
+                    "fit needs a run with that number in its place");
+  return config.data.lens.lens;
+}
+
 /// The sections of a fit that are the run's.
-ConfigValue settings_of(const RunConfig& config, const std::vector<LossDescription>& losses) {
+ConfigValue settings_of(const RunPaths& paths, const RunConfig& config, const std::vector<LossDescription>& losses) {
   const ConfigValue resolved = sections_beside_data(config, losses);
   ConfigValue render = *find_member(resolved, "render");
   if (config.estimate_blur) {  // what the run found is in its log alone
@@ -32,7 +46,7 @@ ConfigValue settings_of(const RunConfig& config, const std::vector<LossDescripti
     log_warning("render.blur of the run is \"estimate\"; the fit takes the preset's, or --set render.blur=X");
   }
   ConfigValue settings = ConfigValue::make_object();
-  settings.add("avatar", ConfigValue::make_string(config.data.avatar.string()));
+  settings.add("avatar", ConfigValue::make_string(avatar_of(paths, config)));
   settings.add("render", std::move(render));
   return settings;
 }
@@ -62,14 +76,17 @@ RunViews run_views(const fs::path& run, const std::vector<LossDescription>& loss
   set.cameras_file = paths.cameras();
   set.motion = read_motion_with_warnings(paths.motion());
   set.cameras = read_cameras(paths.cameras());
-  set.video = std::make_shared<const ClipVideo>(open_video(config.data, {}));
+  ClipVideo video = open_video(config.data, {});
+  video.lens = lens_of(paths, config);
+  video.camera = set.cameras.empty() ? Camera() : set.cameras.front();
+  set.video = std::make_shared<const ClipVideo>(std::move(video));
   const Index frames = set.video->frames.count();
   if (std::ssize(set.motion.poses) != frames || std::ssize(set.cameras) != frames)
     throw UserError(run.string() + ": has " + std::to_string(set.motion.poses.size()) + " poses and " +
                     std::to_string(set.cameras.size()) + " cameras, its video " + std::to_string(frames) +
                     " frames; allowed: as many of each");
   set.views = chosen_views(frames);
-  return {std::move(set), settings_of(config, losses)};
+  return {std::move(set), settings_of(paths, config, losses)};
 }
 
 }  // namespace hsi4d::cli

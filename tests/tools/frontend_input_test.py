@@ -67,8 +67,8 @@ with tempfile.TemporaryDirectory() as name:
     video = here / "video.mp4"
     video.write_text("no video")
     frontend = [tools / "frontend", video, "--out", here / "found", "--packages", here / "packages"]
-    assert "there is no node (Debian package nodejs)" in run(*frontend, env=path_with(here / "a", ["ffmpeg"]))
-    assert "there is no ffmpeg (Debian package ffmpeg)" in run(*frontend, env=path_with(here / "b", ["node"]))
+    assert "there is no node, and it cannot be installed (Debian package nodejs)" in run(*frontend, env=path_with(here / "a", ["ffmpeg"]))
+    assert "there is no ffmpeg, and it cannot be installed (Debian package ffmpeg)" in run(*frontend, env=path_with(here / "b", ["node"]))
     said = run(*frontend, env=path_with(here / "c", ["node", "ffmpeg"]))
     assert "there is no Chromium, and it cannot be installed (Debian package chromium)" in said, said
 
@@ -110,4 +110,13 @@ with tempfile.TemporaryDirectory() as name:
     assert "tools/frontend makes them" in run(*from_video, "--masks", here)
     assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x")
     assert not (here / "x").exists()
+
+    # A folder of another video or of other options is no place for this one.
+    (here / "y").mkdir()
+    (here / "y/made_of.txt").write_text("another video\n")
+    said = run(tools / "from_video", video, "--out", here / "y")
+    assert "was made of another video or with other options" in said and "name a new folder" in said, said
+    (here / "y/made_of.txt").unlink()
+    (here / "y/found").mkdir()
+    assert "no made_of.txt says of what" in run(tools / "from_video", video, "--out", here / "y")
 print("passed")

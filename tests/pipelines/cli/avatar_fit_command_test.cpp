@@ -218,6 +218,38 @@ TEST_CASE("hsi4d avatar fit learns from the frames of a run, beginning with its 
   CHECK(read_avatar("b.safetensors").colors == first.colors);
 }
 
+TEST_CASE("hsi4d avatar fit of a run takes the avatar that the run found, and its lens") {
+  const TemporaryFolder folder;
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "run");
+  const auto fit_of_run = [](const std::string& out) {
+    const ProgramResult fitted = run_hsi4d(
+        {"avatar", "fit", "--run", "run", "--set", "stage.iterations=4", "--quiet", "--out", out + ".safetensors"});
+    CAPTURE(fitted.err);
+    REQUIRE(fitted.status == 0);
+    return fitted.out;
+  };
+  const auto figures = [](const std::string& text, const std::string& of) {
+    const std::size_t begin = text.find(of) + of.size();
+    return text.substr(begin, text.find('\n', begin) - begin);
+  };
+  const std::string first = fit_of_run("first");
+  fs::copy_file("first.safetensors", "run/avatar.safetensors");
+  const std::string second = fit_of_run("second");
+  CHECK(figures(first, "  before: ") != figures(first, "  learnt: "));
+  CHECK(figures(second, "  before: ") == figures(first, "  learnt: "));
+
+  const auto set_k1 = [](const nlohmann::json& k1) {
+    write_changed("run/config.resolved.json", "run/config.resolved.json",
+                  [&](auto& config) { config["data"]["lens"]["k1"] = k1; });
+  };
+  set_k1(0.4);
+  CHECK(figures(fit_of_run("bent"), "  before: ") != figures(second, "  before: "));
+  set_k1("estimate");
+  const ProgramResult refused = run_hsi4d({"avatar", "fit", "--run", "run", "--quiet", "--out", "a.safetensors"});
+  CHECK(refused.status == 2);
+  CHECK_THAT(refused.err, Contains("config.resolved.json: /data/lens/k1: is \"estimate\""));
+}
+
 TEST_CASE("hsi4d avatar fit refuses what is no run that is done") {
   const TemporaryFolder folder;
   write_inputs();
