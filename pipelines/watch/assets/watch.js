@@ -242,7 +242,7 @@ function drawByFrame(stages) {
     points: [...view.curves.values()].filter(curve => curve.stage === stage && curve.frame !== null && curve.loss.length > 0)
       .map(({ frame, loss }) => [frame, loss.at(-1)[1]]).sort((a, b) => a[0] - b[0]) })).filter(({ points }) => points.length > 0);
   if (series.length === 0) return;
-  card("plot-frames", "Loss at the end", "by frame", series, series.map(({ stage, colour, points }) => ({ colour, text: `${stage} ${short(points.at(-1)[1])}` })));
+  card("plot-frames", "Last loss", "by frame", series, series.map(({ stage, colour, points }) => ({ colour, text: `${stage} ${short(points.at(-1)[1])}` })));
 }
 
 function drawStage(stage, index, shownFrame) {

@@ -88,7 +88,7 @@ try {
   status('running');
   check('a run that begins appears in the table', await text(page, 'table', 'live'));
   await page.locator('#table a', { hasText: 'live' }).click();
-  check('it has no frame and no iteration yet', await text(page, 'facts', 'iterations0') && await page.locator('#no-frames').isVisible());
+  check('it has no frame and no iteration yet', await text(page, 'facts', 'frames0iterations0') && await page.locator('#no-frames').isVisible());
   writeFileSync(metrics, line(1, 'camera', 0, 0.5) + line(1, 'camera', 1, 0.25) + line(1, 'camera', 2, 0.1).slice(0, 30));
   check('its iterations are counted without half a line', await text(page, 'facts', 'iterations2'));
   appendFileSync(metrics, `${line(1, 'camera', 2, 0.1).slice(30)}no line\n`);
