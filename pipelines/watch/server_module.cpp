@@ -42,9 +42,9 @@ LocalServer* open(int port, std::function<ServedReply(const ServedRequest&)> ans
   httplib::Server& server = opened->server;
   server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
   server.set_socket_options(allow_reuse_after_end);
-  server.set_keep_alive_max_count(1);  // an idle connection would keep its thread, and the end waiting
+  server.set_keep_alive_max_count(1);        // an idle connection would keep its thread, and the end waiting
+  server.set_keep_alive_timeout(kPatience);  // for the first request too
   server.set_read_timeout(kPatience);
-  server.set_write_timeout(kPatience);
   server.set_payload_max_length(kLargestBody);
   server.set_default_headers({{"Content-Security-Policy",
                                "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
