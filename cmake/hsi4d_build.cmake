@@ -250,16 +250,17 @@ function(hsi4d_embed_report_assets)
   target_sources(hsi4d_pipelines_report PRIVATE ${PROJECT_BINARY_DIR}/generated/report_assets.cpp)
 endfunction()
 
-# Style, body and script of a study's page, likewise.
-function(hsi4d_embed_study_assets)
-  set(folder ${PROJECT_SOURCE_DIR}/pipelines/study/assets)
+# hsi4d_embed_page(ROOM): style, HTML and script of a room's page, likewise.
+function(hsi4d_embed_page room)
+  string(TOUPPER ${room} name)
   foreach(kind css html js)
-    string(TOUPPER ${kind} name)
-    file(READ ${folder}/study.${kind} HSI4D_STUDY_${name})
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/study.${kind})
+    string(TOUPPER ${kind} part)
+    set(file ${PROJECT_SOURCE_DIR}/pipelines/${room}/assets/${room}.${kind})
+    file(READ ${file} HSI4D_${name}_${part})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
   endforeach()
-  configure_file(${PROJECT_SOURCE_DIR}/cmake/study_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/study_assets.cpp @ONLY)
-  target_sources(hsi4d_pipelines_study PRIVATE ${PROJECT_BINARY_DIR}/generated/study_assets.cpp)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/${room}_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/${room}_assets.cpp @ONLY)
+  target_sources(hsi4d_pipelines_${room} PRIVATE ${PROJECT_BINARY_DIR}/generated/${room}_assets.cpp)
 endfunction()
 
 # Compiler and flags, which measurements tell beside their times.

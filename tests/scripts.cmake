@@ -79,7 +79,7 @@ if(HSI4D_PYTHON3 AND NOT HSI4D_SANITIZE)
   set_tests_properties("the front end finds a person" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 900)
 endif()
 
-# The report and a study in a browser; they say so where playwright-core or Chromium is missing (tools/test_report installs them).
+# The report, a study and a run that is watched in a browser; they say so where playwright-core or Chromium is missing (tools/test_report installs them).
 find_program(HSI4D_NODE node)
 if(HSI4D_SANITIZE)  # the pages are the same, and the program takes longer to make one
 elseif(HSI4D_NODE)
@@ -89,10 +89,13 @@ elseif(HSI4D_NODE)
   add_test(NAME "a study in a browser"
            COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/study/browser_test.mjs $<TARGET_FILE:hsi4d>
                    ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
-  set_tests_properties("the report in a browser" "a study in a browser"
+  add_test(NAME "watching a run in a browser"
+           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/watch/browser_test.mjs $<TARGET_FILE:hsi4d>
+                   ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
+  set_tests_properties("the report in a browser" "a study in a browser" "watching a run in a browser"
                        PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 600)
 else()
-  message(STATUS "There is no node: the report and a study are not tested in a browser")
+  message(STATUS "There is no node: the report, a study and `hsi4d watch` are not tested in a browser")
 endif()
 
 # The Python module, and its page, docs/python.md.

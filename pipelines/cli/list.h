@@ -23,6 +23,7 @@
   HSI4D_COMMAND(study)          \
   HSI4D_COMMAND(sweep)          \
   HSI4D_COMMAND(run_one)        \
+  HSI4D_COMMAND(watch)          \
   HSI4D_COMMAND(render)         \
   HSI4D_COMMAND(gradients)      \
   HSI4D_COMMAND(avatar)         \
