@@ -89,7 +89,7 @@ with tempfile.TemporaryDirectory() as name:
     for file in ["hands.js", "hands.binarypb", "hands_solution_packed_assets.data"]:
         (hands / file).write_text("something")
     said = run(*frontend, "--hands", env=whole)
-    assert "hands/hand_landmark_full.tflite is missing; remove " in said and "--install --hands" in said, said
+    assert "hands/hand_landmark_full.tflite is missing; remove " in said and "--hands" in said, said
     assert not (here / "found").exists()
 
     # A hand is that at BlazePose's wrist, in pixels of the frame.
@@ -107,6 +107,8 @@ with tempfile.TemporaryDirectory() as name:
     assert "both say where the camera is" in run(*in_scene, "--guess", video, "--camera", video)
     assert "none.json: there is no such file" in run(*in_scene, "--guess", here / "none.json")
     assert "allowed: learnt, kept" in run(*from_video, "--look", "found")
+    assert "a video and --out DIR are needed" in run(tools / "from_video", video)
+    assert "is there and no folder" in run(tools / "from_video", video, "--out", video)
     assert "tools/frontend makes them" in run(*from_video, "--masks", here)
     assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x")
     assert not (here / "x").exists()
