@@ -374,6 +374,19 @@ std::vector<const FoundPerson*> followed(const FoundKeypoints& found, const std:
   return persons;
 }
 
+void tell_empty_frames(const Keypoints& keypoints, const std::string& file) {
+  std::vector<Index> empty;
+  for (std::size_t t = 0; t < keypoints.frames.size(); ++t) {
+    const std::vector<Keypoint>& points = keypoints.frames[t];
+    if (std::none_of(points.begin(), points.end(), [](const Keypoint& point) { return point.confidence > 0; }))
+      empty.push_back(static_cast<Index>(t));
+  }
+  if (empty.empty()) return;
+  log_warning(file + ": shows nobody in " + std::to_string(empty.size()) + " of " +
+              std::to_string(keypoints.frames.size()) + " frames (" + frame_ranges(empty) +
+              "); losses of keypoints are off there");
+}
+
 }  // namespace
 
 FoundKeypoints read_found_keypoints(const fs::path& path, const std::vector<KeypointJoints>& joints) {
@@ -448,23 +461,6 @@ std::vector<fs::path> keypoint_files(const fs::path& keypoints) {
   }
   return files;
 }
-
-namespace {
-
-void tell_empty_frames(const Keypoints& keypoints, const std::string& file) {
-  std::vector<Index> empty;
-  for (std::size_t t = 0; t < keypoints.frames.size(); ++t) {
-    const std::vector<Keypoint>& points = keypoints.frames[t];
-    if (std::none_of(points.begin(), points.end(), [](const Keypoint& point) { return point.confidence > 0; }))
-      empty.push_back(static_cast<Index>(t));
-  }
-  if (empty.empty()) return;
-  log_warning(file + ": shows nobody in " + std::to_string(empty.size()) + " of " +
-              std::to_string(keypoints.frames.size()) + " frames (" + frame_ranges(empty) +
-              "); losses of keypoints are off there");
-}
-
-}  // namespace
 
 Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames) {
   const std::string file = data.keypoints.string();

@@ -156,7 +156,10 @@ TEST_CASE("OpenPose's folder has a file a frame") {
     write("pose/clip_00000000000" + std::to_string(t) + "_keypoints.json", {{"version", 1.3}, {"people", people}});
   }
   std::ofstream("pose/note.txt") << "mine";
+  std::string told;
+  const LogSink sink = log_to([&told](LogLevel, std::string_view text) { told += text; });
   const Keypoints found = Workshop::read("pose");
+  CHECK_THAT(told, Contains("pose: shows nobody in 1 of 3 frames (1); losses of keypoints are off there"));
   CHECK(found.joints.size() == 16);
   CHECK(found.joints[0] == KeypointJoints{{smplx_joint("left_shoulder"), 0.5}, {smplx_joint("right_shoulder"), 0.5}});
   CHECK(found.frames[0][0].x == 1.0 / kWidth);  // the neck is the second point
