@@ -9,7 +9,7 @@
 
 #include "body/avatar.h"
 #include "body/smplx_file.h"
-#include "optim/human_object_metrics.h"
+#include "optim/protocols/human_object_metrics.h"
 #include "pipelines/evaluate/tracks.h"
 
 namespace hsi4d {

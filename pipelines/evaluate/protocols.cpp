@@ -6,9 +6,9 @@
 
 #include "core/check.h"
 #include "core/text.h"
-#include "optim/human_object_metrics.h"
 #include "optim/metrics.h"
-#include "optim/world_motion_metrics.h"
+#include "optim/protocols/human_object_metrics.h"
+#include "optim/protocols/world_motion_metrics.h"
 
 namespace hsi4d {
 

@@ -12,8 +12,8 @@
 
 namespace hsi4d {
 
-/// Whose protocol is followed. Those of EMDB-2 and RICH are the same (optim/world_motion_metrics.h), and so are those
-/// of BEHAVE and InterCap (optim/human_object_metrics.h).
+/// Whose protocol is followed. Those of EMDB-2 and RICH are the same (optim/protocols/world_motion_metrics.h), and so
+/// are those of BEHAVE and InterCap (optim/protocols/human_object_metrics.h).
 enum class Protocol { kNone, kEmdb2, kRich, kBehave, kInterCap };
 
 inline constexpr std::array<ConfigChoice<Protocol>, 4> kProtocols = {{{Protocol::kEmdb2, "emdb2"},

@@ -208,10 +208,10 @@ TEST_CASE("hsi4d init takes a person whose feet are out of the picture in some f
   write_changed("keypoints.json", "late.json", [](auto& k) {
     for (const std::size_t ankle : {7U, 8U}) k["frames"][0][ankle] = {20, 60, 0.2};
   });
-  const ProgramResult late = run_hsi4d({"init", (TinyDataset::folder() / "frames").string(), "--keypoints", "late.json",
-                                        "--masks", (TinyDataset::folder() / "masks").string(), "--avatar",
-                                        (TinyDataset::folder() / "avatar.safetensors").string(), "--video-rate", "10",
-                                        "--out", "later"});
+  const ProgramResult late =
+      run_hsi4d({"init", (TinyDataset::folder() / "frames").string(), "--keypoints", "late.json", "--masks",
+                 (TinyDataset::folder() / "masks").string(), "--avatar",
+                 (TinyDataset::folder() / "avatar.safetensors").string(), "--video-rate", "10", "--out", "later"});
   CHECK(late.status == 0);
   CHECK_THAT(late.err, Contains("late.json: no ankles are on the ground in frame 0; the first state has the person of "
                                 "frame 1"));

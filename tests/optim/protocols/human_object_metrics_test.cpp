@@ -1,4 +1,4 @@
-#include "optim/human_object_metrics.h"
+#include "optim/protocols/human_object_metrics.h"
 
 #include <cmath>
 #include <limits>
@@ -8,8 +8,8 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "optim/surface_points.h"
-#include "tests/optim/protocol_reference.h"
+#include "optim/protocols/surface_points.h"
+#include "tests/optim/protocols/protocol_reference.h"
 #include "tests/support/random_numbers.h"
 
 namespace human_object_metrics_test {
@@ -93,7 +93,7 @@ void check_scenes(const Scenes& scenes, Index window) {
   check_close(*errors.acceleration_object, 100 * plain_acceleration(laid[1], scenes.truth[1], frames));
 }
 
-/// As tests/optim/protocol_numbers.py has it.
+/// As tests/optim/protocols/protocol_numbers.py has it.
 PlainFrames waves(std::size_t frames, std::size_t points, double phase, double size) {
   PlainFrames all(frames, PlainPoints(points));
   for (std::size_t t = 0; t < frames; ++t) {
@@ -134,7 +134,7 @@ TEST_CASE("human and object are measured as by the independent protocol") {
 }
 
 TEST_CASE("human and object are measured as by NumPy") {
-  // tests/optim/protocol_numbers.py
+  // tests/optim/protocols/protocol_numbers.py
   const Sides estimate = {waves(10, 30, 0.4, 0.6), waves(10, 12, 0.9, 0.3)},
               truth = {waves(10, 30, 0, 0.5), waves(10, 12, 0.7, 0.35)};
   const HumanObjectErrors errors = human_object_errors(motion_of(estimate), motion_of(truth), {}, 4);

@@ -1,4 +1,4 @@
-#include "optim/human_object_metrics.h"
+#include "optim/protocols/human_object_metrics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "optim/metrics.h"
+#include "optim/protocols/surface_points.h"
 #include "optim/similarity.h"
-#include "optim/surface_points.h"
 
 namespace hsi4d {
 namespace {

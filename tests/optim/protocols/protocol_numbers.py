@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The numbers of "metrics of protocols are those of NumPy" in world_motion_metrics_test.cpp and human_object_metrics_test.cpp.
 
-    python3 tests/optim/protocol_numbers.py
+    python3 tests/optim/protocols/protocol_numbers.py
 
 By NumPy's singular value decomposition, from the published words of the protocols; nothing of hsi4d is used.
 """

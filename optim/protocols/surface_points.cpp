@@ -1,4 +1,4 @@
-#include "optim/surface_points.h"
+#include "optim/protocols/surface_points.h"
 
 #include <algorithm>
 #include <cmath>

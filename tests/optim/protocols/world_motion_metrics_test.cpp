@@ -1,4 +1,4 @@
-#include "optim/world_motion_metrics.h"
+#include "optim/protocols/world_motion_metrics.h"
 
 #include <cmath>
 #include <limits>
@@ -8,7 +8,7 @@
 #include "core/check.h"
 #include "optim/metrics.h"
 #include "optim/similarity.h"
-#include "tests/optim/protocol_reference.h"
+#include "tests/optim/protocols/protocol_reference.h"
 #include "tests/support/random_numbers.h"
 
 namespace world_motion_metrics_test {
@@ -191,7 +191,7 @@ TEST_CASE("the protocols' jitter is a tenth of ours at any rate") {
 }
 
 TEST_CASE("metrics of protocols are those of NumPy") {
-  // tests/optim/protocol_numbers.py
+  // tests/optim/protocols/protocol_numbers.py
   const PlainFrames truth = waves(230, 22, 0, 0.5), shifted = waves(230, 22, 0.3, 0.5), more = waves(230, 22, 2, 1);
   PlainFrames own = truth;
   for (std::size_t t = 0; t < 230; ++t) {

@@ -1,4 +1,4 @@
-#include "optim/world_motion_metrics.h"
+#include "optim/protocols/world_motion_metrics.h"
 
 #include <algorithm>
 #include <cmath>
