@@ -23,6 +23,7 @@ constexpr const char* kTranslationNames[] = {"trans", "transl", "human_transl", 
 constexpr const char* kPosesNames[] = {"poses", "pose_world"};
 constexpr double kSameRate = 1e-5;  // float against double
 constexpr const char* kFrameNames[] = {"frame_ids", "frame_id"};
+constexpr const char* kSigmaName = "joint_sigma";
 constexpr const char* kRateNames[] = {"mocap_frame_rate", "mocap_framerate", "frame_rate", "fps"};
 
 /// A run of joints that files keep in an array of its own.
@@ -330,7 +331,7 @@ bool is_among(std::string_view name, std::span<const char* const> names) {
 }
 
 bool is_read(const std::string& name) {
-  constexpr const char* kSingle[] = {"first_frame", "betas", "gender", "pelvis_rest", "surface_model_type"};
+  constexpr const char* kSingle[] = {"first_frame", "betas", "gender", "pelvis_rest", "surface_model_type", kSigmaName};
   return is_among(name, kTranslationNames) || is_among(name, kPosesNames) || is_among(name, kFrameNames) ||
          is_among(name, kRateNames) || is_among(name, kSingle) || is_among(name, kSaidAgain) ||
          is_among(name, kOfObjects) || is_among(name, kOfProtocols) ||
@@ -397,6 +398,25 @@ void add_joints(NpzWriter& file, const char* name, const Motion& motion, std::si
   file.add<double>(name, {static_cast<int64_t>(motion.poses.size()), static_cast<int64_t>(3 * joints)}, numbers);
 }
 
+std::vector<double> joint_sigmas_in(const Npz& file) {
+  const NpyArray* const array = find(file, kSigmaName);
+  if (array == nullptr) return {};
+  const NpyArray* const places = find_first(file, kTranslationNames);
+  const std::vector<int64_t>& shape = array->shape();
+  const bool fits = shape.size() == 3 && shape[1] > 0 && shape[1] <= kSmplxJoints && shape[2] == 2 &&
+                    (places == nullptr || places->shape().empty() || places->shape().front() == shape[0]);
+  if (!fits)
+    throw DataError(array->source() + ": has shape " + shape_text(shape) +
+                    "; allowed: [T,J,2] for the T frames of the file, at most " + std::to_string(kSmplxJoints) +
+                    " joints");
+  std::vector<double> sigmas = array->as<double>();
+  const auto bad = std::find_if(sigmas.begin(), sigmas.end(), [](double sigma) { return sigma < 0; });
+  if (bad != sigmas.end())
+    throw DataError(array->source() + ": number " + std::to_string(bad - sigmas.begin()) + " is " + number_text(*bad) +
+                    "; allowed: 0 or more");
+  return sigmas;
+}
+
 }  // namespace
 
 Motion read_motion(const std::string& path) { return motion_of(Npz::read(path)); }
@@ -405,7 +425,13 @@ Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name
   return motion_of(Npz::decode(file, name));
 }
 
-void write_motion(const std::string& path, const Motion& motion) {
+std::vector<double> read_joint_sigmas(const std::string& path) { return joint_sigmas_in(Npz::read(path)); }
+
+std::vector<double> decode_joint_sigmas(std::span<const std::uint8_t> file, const std::string& name) {
+  return joint_sigmas_in(Npz::decode(file, name));
+}
+
+void write_motion(const std::string& path, const Motion& motion, const std::vector<double>& joint_sigmas) {
   HSI4D_CHECK(!motion.poses.empty(), "a motion without frames");
   HSI4D_CHECK(motion.frame_rate > 0 && std::isfinite(motion.frame_rate), std::to_string(motion.frame_rate) + " Hz");
   std::vector<double> trans;
@@ -426,6 +452,11 @@ void write_motion(const std::string& path, const Motion& motion) {
     file.add<double>("pelvis_rest", {3}, {pelvis[0], pelvis[1], pelvis[2]});
   }
   if (motion.first_frame != 0) file.add_scalar("first_frame", motion.first_frame);
+  if (!joint_sigmas.empty()) {
+    const auto joints = static_cast<int64_t>(joint_sigmas.size()) / (2 * frames);
+    HSI4D_CHECK_EQ(static_cast<int64_t>(joint_sigmas.size()), 2 * frames * joints);
+    file.add<double>(kSigmaName, {frames, joints, 2}, joint_sigmas);
+  }
   file.add_text("gender", motion.gender);
   file.add_text("surface_model_type", "smplx");
   file.add_scalar("mocap_frame_rate", motion.frame_rate);

@@ -66,8 +66,19 @@ Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name
 /// where it is known. The add-on wants at least the rate that it is asked to import at, 30 unless told otherwise: see
 /// resampled (motion_edit.h).
 ///
+/// @param joint_sigmas  [T,J,2] how sure the places of the first J joints are: one standard deviation across the view
+/// of
+///                      the frame's camera, and along it, metres; written as `joint_sigma`. Empty: not known
 /// Throws UserError when the file cannot be written, InternalError when there is no frame, a
 /// pose has not 55 joints, or the frame rate is not positive.
-void write_motion(const std::string& path, const Motion& motion);
+void write_motion(const std::string& path, const Motion& motion, const std::vector<double>& joint_sigmas = {});
+
+/// Reads `joint_sigma` of a motion; empty where it has none. Infinite: nothing tells the place; not a number: nobody
+/// looked.
+///
+/// Throws as read_motion: a shape that is not [T,J,2] for the T frames of the file, a negative number.
+std::vector<double> read_joint_sigmas(const std::string& path);
+/// As read_joint_sigmas, of a file in memory. @param name  what messages call it
+std::vector<double> decode_joint_sigmas(std::span<const std::uint8_t> file, const std::string& name);
 
 }  // namespace hsi4d

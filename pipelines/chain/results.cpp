@@ -20,12 +20,13 @@ namespace hsi4d {
 
 namespace {
 
-/// All frames of the chain: of later clips without frame 0.
+/// All frames of the chain: of later clips without frame 0. Nothing where a clip has none.
 template <class T, class Get>
 std::vector<T> joined(const std::vector<ClipResult>& clips, const Get& get) {
   std::vector<T> all;
   for (const ClipResult& clip : clips) {
     const std::vector<T>& own = get(clip);
+    if (own.empty()) return {};
     all.insert(all.end(), own.begin() + (all.empty() ? 0 : 1), own.end());
   }
   return all;
@@ -140,6 +141,7 @@ ClipResult read_clip_result(const std::string& clip, const std::string& folder,
   result.cameras = read_cameras(paths.cameras());
   std::vector<std::vector<ObjectPose>> tracks(result.motion.poses.size());
   if (!objects.empty()) tracks = read_object_tracks(paths.objects(), objects);
+  result.sigmas = read_place_sigmas(paths.motion(), paths.objects(), objects);
   if (result.cameras.size() != result.motion.poses.size() || tracks.size() != result.motion.poses.size())
     throw DataError(folder + ": the result of the clip \"" + clip + "\" has " +
                     std::to_string(result.motion.poses.size()) + " poses, " + std::to_string(result.cameras.size()) +
@@ -151,11 +153,13 @@ ClipResult read_clip_result(const std::string& clip, const std::string& folder,
 
 ChainSummary write_chain_results(const RunPaths& paths, const RunConfig& config, const ChainResult& result) {
   const Motion motion = joined_motion(result);
-  write_motion(paths.motion(), motion);
+  const auto sigmas = joined<PlaceSigmas>(
+      result.clips, [](const ClipResult& clip) -> auto& { return clip.sigmas; });
+  write_motion(paths.motion(), motion, joint_sigmas_of(sigmas));
   write_motion(paths.motion_at_30(), resampled(motion, kExportedRate));
   const auto states = joined<SceneState>(
       result.clips, [](const ClipResult& clip) -> auto& { return clip.states; });
-  if (!result.objects.empty()) write_object_tracks(paths.objects(), result.objects, states);
+  if (!result.objects.empty()) write_object_tracks(paths.objects(), result.objects, states, sigmas);
   write_cameras(paths.cameras(), joined<Camera>(
                                      result.clips, [](const ClipResult& clip) -> auto& { return clip.cameras; }));
   ChainSummary summary = summary_of(config, result, motion);

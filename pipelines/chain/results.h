@@ -14,7 +14,8 @@ struct ClipResult {
   RunSummary summary;
   Motion motion;
   std::vector<Camera> cameras;
-  std::vector<SceneState> states;  ///< by frame, frame 0 included
+  std::vector<SceneState> states;   ///< by frame, frame 0 included
+  std::vector<PlaceSigmas> sigmas;  ///< likewise; empty: nobody asked
 };
 
 /// Reads the result of a run folder that is complete.

@@ -81,6 +81,10 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
   f.boolean("remove_depth_bias", s.remove_depth_bias,
             "Fit frame 0 too, and move human and objects of all others by what that does to their given distance");
+  f.boolean(
+      "uncertainty", s.uncertainty,
+      "Also tell how sure the places of joints and objects are in each frame, from the curvature of its last stage "
+      "with an image");
   f.object("camera", s.camera, "How cameras are optimised");
   f.object("camera_selection", s.camera_selection,
            "How `hsi4d select-camera`, and `select_camera` of a clip of a chain, choose the camera of frame 0");

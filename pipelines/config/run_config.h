@@ -88,6 +88,7 @@ struct RunConfig {
   SyntheticSettings synthetic;
   RenderSettings render;
   bool remove_depth_bias = false;  ///< see pipelines/run/depth_bias.h
+  bool uncertainty = false;        ///< see pipelines/run/place_uncertainty.h
   bool estimate_blur = false;      ///< render.blur is what frame 0 says, found as the run begins
   SkipSettings skip;
   ApproxSettings approx;

@@ -448,6 +448,19 @@ void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& 
 
 }  // namespace
 
+std::optional<std::size_t> stage_of_sigmas(const RunConfig& config) {
+  constexpr std::array<LossInput, 3> kPixels = {LossInput::kImage, LossInput::kHumanOpacity, LossInput::kObjectOpacity};
+  for (std::size_t s = config.stages.size(); s-- > 0;) {
+    const StageSettings& stage = config.stages[s].second;
+    if (stage.over != StageScope::kFrame || stage.draw != Draw::kAll) continue;
+    for (const auto& [name, loss] : stage.losses) {
+      if (std::any_of(kPixels.begin(), kPixels.end(), [&](LossInput input) { return needs_input(loss, input); }))
+        return s;
+    }
+  }
+  return std::nullopt;
+}
+
 std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   std::vector<RunProblem> found;
   if (use == ConfigUse::kSettings) return found;
@@ -463,6 +476,10 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_unknown_problems(config, found);
   add_lens_problems(config.data, found);
   add_given_frame_problems(config, found);
+  if (config.uncertainty && !config.stages.empty() && !stage_of_sigmas(config))
+    found.push_back({"/uncertainty",
+                     "no stage over frames moves human and objects and compares images or masks; allowed: false",
+                     {"/uncertainty", "/stages"}});
   add_keypoint_problems(config, found);
   if (!config.chain.empty()) {
     add_command_problems(config.sources, found);

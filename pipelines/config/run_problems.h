@@ -1,6 +1,8 @@
 // What is wrong with a config as a whole, each setting being right in itself.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +11,10 @@
 #include "pipelines/config/run_config.h"
 
 namespace hsi4d {
+
+/// The stage whose end tells how sure places are: the last over frames that moves what moves and compares pixels; none
+/// where there is no such stage.
+std::optional<std::size_t> stage_of_sigmas(const RunConfig& config);
 
 /// A problem and the place of the setting that it is about.
 struct RunProblem {

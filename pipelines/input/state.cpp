@@ -1,9 +1,12 @@
 #include "pipelines/input/state.h"
 
 #include <cmath>
+#include <limits>
 
+#include "body/motion_io.h"
 #include "core/check.h"
 #include "core/npz.h"
+#include "optim/metrics.h"
 
 namespace hsi4d {
 
@@ -19,6 +22,11 @@ std::vector<double> track(const std::vector<SceneState>& frames, std::size_t obj
   return numbers;
 }
 
+void append(const PlaceSigma& sigma, std::vector<double>& numbers) {
+  numbers.push_back(sigma.across);
+  numbers.push_back(sigma.along);
+}
+
 /// An array [T,3] of the archive; T = -1 takes any.
 std::vector<double> read_track(const Npz& npz, const std::string& name, std::int64_t frames) {
   std::vector<double> track = npz.array(name).require_shape({frames, 3}).as<double>();
@@ -31,13 +39,23 @@ std::vector<double> read_track(const Npz& npz, const std::string& name, std::int
 
 }  // namespace
 
+PlaceSigmas no_sigmas(std::size_t objects) {
+  constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
+  return {std::vector<PlaceSigma>(static_cast<std::size_t>(kMetricJoints), {kNotANumber, kNotANumber}),
+          std::vector<PlaceSigma>(objects, {kNotANumber, kNotANumber})};
+}
+
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,
-                         const std::vector<SceneState>& frames) {
+                         const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas) {
   NpzWriter writer;
   const auto count = static_cast<std::int64_t>(frames.size());
   for (std::size_t o = 0; o < names.size(); ++o) {
     writer.add<double>(names[o] + "/rotation", {count, 3}, track(frames, o, &ObjectPose::rotation));
     writer.add<double>(names[o] + "/translation", {count, 3}, track(frames, o, &ObjectPose::translation));
+    if (sigmas.empty()) continue;
+    std::vector<double> numbers;
+    for (const PlaceSigmas& frame : sigmas) append(frame.objects.at(o), numbers);
+    writer.add<double>(names[o] + "/sigma", {count, 2}, numbers);
   }
   writer.write(path);
 }
@@ -58,6 +76,37 @@ std::vector<std::vector<ObjectPose>> read_object_tracks(const std::string& path,
     }
   }
   return frames;
+}
+
+std::vector<double> joint_sigmas_of(const std::vector<PlaceSigmas>& sigmas) {
+  std::vector<double> numbers;
+  for (const PlaceSigmas& frame : sigmas) {
+    for (const PlaceSigma& joint : frame.joints) append(joint, numbers);
+  }
+  return numbers;
+}
+
+std::vector<PlaceSigmas> read_place_sigmas(const std::string& motion, const std::string& objects,
+                                           const std::vector<std::string>& names) {
+  const std::vector<double> joints = read_joint_sigmas(motion);
+  constexpr std::size_t kOfJoints = 2 * static_cast<std::size_t>(kMetricJoints);
+  if (joints.size() % kOfJoints != 0)
+    throw DataError(motion + ": \"joint_sigma\" is not of " + std::to_string(kMetricJoints) + " joints");
+  std::vector<PlaceSigmas> sigmas(joints.size() / kOfJoints, no_sigmas(names.size()));
+  for (std::size_t i = 0; i < joints.size(); i += 2)
+    sigmas[i / kOfJoints].joints[i % kOfJoints / 2] = {joints[i], joints[i + 1]};
+  if (sigmas.empty() || names.empty()) return sigmas;
+  const Npz npz = Npz::read(objects);
+  for (std::size_t o = 0; o < names.size(); ++o) {
+    const NpyArray& array = npz.array(names[o] + "/sigma");
+    const std::vector<double> numbers = array.require_shape({static_cast<std::int64_t>(sigmas.size()), 2}).as<double>();
+    for (std::size_t t = 0; t < sigmas.size(); ++t) {
+      if (numbers[2 * t] < 0 || numbers[2 * t + 1] < 0)
+        throw DataError(array.source() + ": row " + std::to_string(t) + " holds a number below 0");
+      sigmas[t].objects[o] = {numbers[2 * t], numbers[2 * t + 1]};
+    }
+  }
+  return sigmas;
 }
 
 std::vector<BodyPose> bodies_of(const std::vector<SceneState>& frames) {

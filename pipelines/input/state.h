@@ -23,9 +23,39 @@ struct SceneState {
   BodyPose body;
 };
 
-/// Writes objects.npz: NAME/rotation [T,3] and NAME/translation [T,3], float64.
+/// How sure a place is in the axes of its frame's camera: one standard deviation, metres. Infinite: nothing tells it;
+/// not a number: nobody looked, as in a frame that is given.
+struct PlaceSigma {
+  double across = 0;  ///< along each of the image's two axes, their quadratic mean
+  double along = 0;   ///< along the camera's z
+
+  bool operator==(const PlaceSigma&) const = default;
+};
+
+/// How sure the places of a frame are.
+struct PlaceSigmas {
+  std::vector<PlaceSigma> joints;   ///< of the first kMetricJoints (optim/metrics.h)
+  std::vector<PlaceSigma> objects;  ///< of their centroids, in the clip's order
+
+  bool operator==(const PlaceSigmas&) const = default;
+};
+
+/// Of a frame that nobody looked at.
+PlaceSigmas no_sigmas(std::size_t objects);
+
+/// Writes objects.npz: NAME/rotation [T,3] and NAME/translation [T,3], and NAME/sigma [T,2] (across, along) where it is
+/// known; float64.
+/// @param sigmas  by frame; empty: not known
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,
-                         const std::vector<SceneState>& frames);
+                         const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas = {});
+
+/// The joints' as motion.npz has them: [T,kMetricJoints,2] (across, along), metres; empty where none are known.
+std::vector<double> joint_sigmas_of(const std::vector<PlaceSigmas>& sigmas);
+
+/// Reads what motion.npz and objects.npz of a run say of how sure places are, by frame; nothing where the motion does
+/// not say it. Throws DataError naming the file and the array when the shape of one is wrong, or a number is negative.
+std::vector<PlaceSigmas> read_place_sigmas(const std::string& motion, const std::string& objects,
+                                           const std::vector<std::string>& names);
 
 /// Reads objects.npz: poses[frame][object] in the order of `names`. Throws DataError naming the file and the array when
 /// one is missing or its shape is wrong.

@@ -154,13 +154,14 @@ Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
 }
 
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                   const std::vector<SceneState>& states, const ColorState& colors) {
+                   const std::vector<SceneState>& states, const ColorState& colors,
+                   const std::vector<PlaceSigmas>& sigmas) {
   std::vector<std::string> names;
   for (const ClipObject& object : clip.objects) names.push_back(object.name);
   const Motion motion = motion_of(clip, states);
-  write_motion(paths.motion(), motion);
+  write_motion(paths.motion(), motion, joint_sigmas_of(sigmas));
   write_motion(paths.motion_at_30(), resampled(motion, kExportedRate));
-  if (!names.empty()) write_object_tracks(paths.objects(), names, states);
+  if (!names.empty()) write_object_tracks(paths.objects(), names, states, sigmas);
   write_cameras(paths.cameras(), cameras_of(states, clip.camera));
   if (colors.net && moves_colors(config)) write_color_net(paths.color_net(), *colors.net);
 }

@@ -21,8 +21,10 @@ inline constexpr double kExportedRate = 30;
 
 /// Writes motion.npz, motion_30fps.npz, objects.npz, cameras.json, and color_net.safetensors where a stage moved it.
 /// @param states  the result by frame, frame 0 included
+/// @param sigmas  how sure its places are, by frame; empty: nobody asked
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                   const std::vector<SceneState>& states, const ColorState& colors);
+                   const std::vector<SceneState>& states, const ColorState& colors,
+                   const std::vector<PlaceSigmas>& sigmas = {});
 
 /// The bodies of the frames as motion.npz has them.
 Motion motion_of(const Clip& clip, const std::vector<SceneState>& states);

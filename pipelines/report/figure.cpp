@@ -225,17 +225,22 @@ std::string tip_of(const Plot& plot, const Series& series, const std::pair<doubl
 
 std::string series_svg(const Plot& plot, const Series& series, const Area& area) {
   std::string points, dots;
-  double x = 0, y = 0;
+  double first_x = 0, x = 0, y = 0;
   const std::string opacity = series.opacity < 1 ? ";opacity:" + fixed_number(series.opacity, 2) : "";
   for (const auto& point : series.points) {
     if (!has_place(plot, point)) continue;
     x = area.at_x(point.first), y = area.at_y(point.second);
+    if (points.empty()) first_x = x;
     points += formatted("%s%.1f,%.1f", points.empty() ? "" : " ", x, y);
     if (series.dots > 0) dots += dot_svg(x, y, series.dots, series.color + opacity, tip_of(plot, series, point));
   }
   if (points.empty()) return "";
   std::string svg;
-  if (series.line > 0)
+  if (series.is_area)
+    svg = formatted(R"(<polygon points="%.1f,%.1f %s %.1f,%.1f" style="fill:%s%s"><title>%s</title></polygon>)",
+                    first_x, area.bottom, points.c_str(), x, area.bottom, series.color.c_str(), opacity.c_str(),
+                    html_escape(series.label).c_str());
+  else if (series.line > 0)
     svg = formatted(R"(<polyline points="%s" style="stroke:%s;stroke-width:%.3g%s%s"><title>%s</title></polyline>)",
                     points.c_str(), series.color.c_str(), series.line, opacity.c_str(),
                     series.is_dashed ? ";stroke-dasharray:5 4" : "", html_escape(series.label).c_str());

@@ -16,6 +16,7 @@ struct Series {
   double dots = 0;    ///< radius of a dot with a tooltip at every point
   double opacity = 1;
   bool is_dashed = false;
+  bool is_area = false;  ///< all below the line is filled, in place of a line
   enum class Name { kNone, kAbove, kBelow };
   Name name = Name::kNone;  ///< where its label stands beside its last point
 };

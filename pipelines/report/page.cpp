@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/progress.h"
 #include "pipelines/record/gradient_table.h"
@@ -190,6 +191,28 @@ Series baseline_line(const Baseline& baseline, const RunSummary& summary, std::s
   return line;
 }
 
+/// How sure the run says that it is, under an error of the same kind: errors up to it are as it says.
+std::optional<Series> sigma_band(const RunSummary& summary, std::string_view error) {
+  const bool is_object = error == "object_translation_cm";
+  const bool is_depth = error == "world_mpjpe_depth_mm";
+  if (!is_object && !is_depth && error != "world_mpjpe_image_mm") return std::nullopt;
+  const std::string before = is_object ? "object_" : "", unit = is_object ? "_cm" : "_mm";
+  Series band{.label = "claimed sigma", .color = "var(--result)", .points = {}, .opacity = 0.18, .is_area = true};
+  for (const FrameMetrics& frame : summary.per_frame) {
+    const double* const across = find_metric(frame.values, before + "sigma_image" + unit);
+    const double* const along = find_metric(frame.values, before + "sigma_depth" + unit);
+    if (across == nullptr || along == nullptr) continue;
+    const double in_image = std::sqrt(2.0) * *across;  // of both axes
+    band.points.emplace_back(frame.frame, is_object ? std::hypot(in_image, *along) : is_depth ? *along : in_image);
+  }
+  return band.points.empty() ? std::nullopt : std::optional(band);
+}
+
+bool has_sigmas(const RunSummary& summary) {
+  return std::any_of(summary.per_frame.begin(), summary.per_frame.end(),
+                     [](const FrameMetrics& frame) { return find_metric(frame.values, "sigma_depth_mm") != nullptr; });
+}
+
 std::string frame_errors_legend(const RunSummary& summary) {
   std::string text = "<p class=\"legend\">";
   for (const Baseline& baseline : summary.baselines) {
@@ -198,7 +221,10 @@ std::string frame_errors_legend(const RunSummary& summary) {
             "\" style=\"border-color:" + baseline_color(baseline) + "\"></span>" + row_label(baseline.name) +
             (baseline.per_frame.empty() ? ", mean" : "") + "</span>";
   }
-  return text + "<span><span class=\"key\" style=\"border-color:var(--result)\"></span>result</span></p>\n";
+  text += "<span><span class=\"key\" style=\"border-color:var(--result)\"></span>result</span>";
+  if (has_sigmas(summary))
+    text += "<span><span class=\"box\" style=\"background:var(--result);opacity:0.18\"></span>claimed sigma</span>";
+  return text + "</p>\n";
 }
 
 std::string frame_errors_section(const RunSummary& summary) {
@@ -213,6 +239,7 @@ std::string frame_errors_section(const RunSummary& summary) {
     plot.begins_at_zero = facts.better <= 0;
     const Series result = frame_line("result", "var(--result)", summary.per_frame, facts.name);
     if (result.points.empty()) continue;
+    if (const std::optional<Series> band = sigma_band(summary, facts.name)) plot.series.push_back(*band);
     for (const Baseline& baseline : summary.baselines) {
       if (!baseline.of_frame_0) plot.series.push_back(baseline_line(baseline, summary, facts.name));
     }

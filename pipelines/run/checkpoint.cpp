@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/simd.h"
 #include "optim/checkpoint.h"
+#include "optim/metrics.h"
 #include "pipelines/metrics/sequence_errors.h"
 
 namespace hsi4d {
@@ -266,6 +267,32 @@ ClipUnknowns stored_unknowns(const Checkpoint& checkpoint, const Clip& clip) {
   return {numbers[0], numbers[1], numbers[2], scales, betas};
 }
 
+/// By frame, joints before objects: across, along.
+void store_sigmas(const std::vector<PlaceSigmas>& sigmas, Checkpoint& checkpoint) {
+  std::vector<double> numbers;
+  for (const PlaceSigmas& frame : sigmas) {
+    for (const auto* places : {&frame.joints, &frame.objects}) {
+      for (const PlaceSigma& place : *places) numbers.insert(numbers.end(), {place.across, place.along});
+    }
+  }
+  checkpoint.set("sigmas", std::move(numbers));
+}
+
+std::vector<PlaceSigmas> stored_sigmas(const Checkpoint& checkpoint, const Clip& clip, std::size_t frames) {
+  if (!checkpoint.has("sigmas")) return {};
+  std::vector<PlaceSigmas> sigmas(frames, no_sigmas(clip.objects.size()));
+  const std::vector<double>& numbers = checkpoint.doubles("sigmas");
+  expect_size(checkpoint, "sigmas", numbers.size(),
+              frames * 2 * (static_cast<std::size_t>(kMetricJoints) + clip.objects.size()));
+  const double* next = numbers.data();
+  for (PlaceSigmas& frame : sigmas) {
+    for (auto* places : {&frame.joints, &frame.objects}) {
+      for (PlaceSigma& place : *places) place = {next[0], next[1]}, next += 2;
+    }
+  }
+  return sigmas;
+}
+
 }  // namespace
 
 const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
@@ -306,6 +333,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   if (!progress.still.empty()) checkpoint.set(kStill, names_text(progress.still));
   if (!progress.left_ranges.empty()) checkpoint.set(kLeftRanges, names_text(progress.left_ranges));
   if (progress.start.seconds > 0) store_start(progress.start, checkpoint);
+  if (!progress.sigmas.empty()) store_sigmas(progress.sigmas, checkpoint);
   store_color_state(progress.colors, checkpoint);
   store_errors("image_errors", progress.image_errors, checkpoint);
   store_errors("start_errors", progress.start_errors, checkpoint);
@@ -354,6 +382,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   progress.inputs = checkpoint.text("inputs");
   if (checkpoint.has(kIsa)) progress.isa = checkpoint.text(kIsa);
   progress.start = stored_start(checkpoint);
+  progress.sigmas = stored_sigmas(checkpoint, clip, static_cast<std::size_t>(frames[0]));
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   const Index first_frame = first_stages > 0 ? 0 : 1;
   progress.left_out = left_out_of(checkpoint, clip, first_stages + stages, first_frame);

@@ -63,6 +63,7 @@ struct RunProgress {
   std::vector<StillGroup> still;                     ///< likewise
   std::vector<LeftRange> left_ranges;                ///< likewise
   StartTotals start;                                 ///< where the best start was chosen
+  std::vector<PlaceSigmas> sigmas;                   ///< [frame]; none unless the config asks for it
   ColorState colors;                                 ///< after the last frame done
   ClipUnknowns unknowns;                             ///< what stages over the first frame found of the clip
   double seconds = 0;                                ///< of the frames done

@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "optim/metrics.h"
 #include "pipelines/config/parameter_groups.h"
+#include "pipelines/config/run_problems.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
@@ -103,6 +104,8 @@ class Reconstruction {
         first_stages_(count_stages(config, StageScope::kFirst)),
         frame_stages_(count_stages(config, StageScope::kFrame)),
         progress_(first_progress(clip_, frame_stages_, first_net(config, clip))),
+        sigmas_(no_sigmas(clip.objects.size())),
+        surest_stage_(config.uncertainty ? stage_of_sigmas(config) : std::nullopt),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
@@ -117,7 +120,7 @@ class Reconstruction {
     warn_of_still_groups(progress_.still, config_);
     warn_of_left_ranges(progress_.left_ranges, config_);
     warn_of_what_is_out_of_view(clip_, result());
-    write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
+    write_results(folder_.paths(), config_, clip_, result(), progress_.colors, progress_.sigmas);
     if (!progress_.unknowns.betas.empty()) write_found_avatar();
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
@@ -170,6 +173,7 @@ class Reconstruction {
       warn_of_other_isa(progress_.isa);
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
+      if (config_.uncertainty && first_stages_ == 0) progress_.sigmas = {sigmas_};
       const ClipFrame frame = read_frame(clip_, 0);
       warn_of_other_first_frame(render_state(config_, clip_, clip_.first, start_colors_), frame.target);
       add_covered(frame, config_.data, progress_.covered);
@@ -301,6 +305,7 @@ class Reconstruction {
     if (progress_.colors.net && moves_colors(config_))
       write_color_net(folder_.paths().frame_color_net(static_cast<int>(index)), *progress_.colors.net);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
+    if (config_.uncertainty) progress_.sigmas.push_back(sigmas_);
     progress_.seconds += seconds_since(begin);
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
     if (events_) events_->end_frame(index);
@@ -398,8 +403,10 @@ class Reconstruction {
       note(frame.index, s, report, &counters, &totals);
     };
     const SceneState before = state;
-    const StageResult result = run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found}, frame,
-                                               state, colors, note_iteration);
+    const bool is_asked = s == surest_stage_ && frame.index > 0;
+    const StageResult result =
+        run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found, is_asked ? &sigmas_ : nullptr},
+                        frame, state, colors, note_iteration);
     drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
@@ -528,7 +535,9 @@ class Reconstruction {
   std::size_t first_stages_, frame_stages_;
   RunProgress progress_;
   RefinementProgress refinement_;
-  TrackPoints tracks_;  // of the frames that are done
+  TrackPoints tracks_;                       // of the frames that are done
+  PlaceSigmas sigmas_;                       // of the frame at hand
+  std::optional<std::size_t> surest_stage_;  // which tells them
   const ColorState start_colors_;
   Progress bar_;
   std::vector<ProgressPart> terms_;  // of the iteration at hand

@@ -8,6 +8,7 @@
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/posed_avatar.h"
 #include "pipelines/graph/frame_masks.h"
+#include "pipelines/run/place_uncertainty.h"
 #include "pipelines/run/recorded_stage.h"
 
 namespace hsi4d {
@@ -203,6 +204,9 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   graph->read_state(stage.optimize, state);
   if (task.found != nullptr) *task.found = graph->unknowns();
   if (colors.net) graph->read_color_net(stage.optimize, *colors.net);
+  if (task.sigmas != nullptr)
+    *task.sigmas = place_sigmas<S>(tape, task, graph->groups(), inputs, foreground_of(frame.frame),
+                                   state.camera_from_world.rotation);
   const Camera& drawn = task.clip.camera;
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,

@@ -30,6 +30,7 @@ struct StageTask {
   const StageWatch* watch = nullptr;    ///< null: nobody wants to know where time goes
   TrackPoints* tracks = nullptr;        ///< what was found of them in the run so far; null: found anew
   ClipUnknowns* found = nullptr;        ///< where to put what a stage of a frame finds of the clip; null: nowhere
+  PlaceSigmas* sigmas = nullptr;        ///< where to put how sure it is of places in the end; null: nobody asks
 };
 
 /// A frame that stages work on.

@@ -8,6 +8,7 @@
 #include "pipelines/metrics/contact_metrics.h"
 #include "pipelines/metrics/keypoint_errors.h"
 #include "pipelines/metrics/penetration.h"
+#include "pipelines/metrics/sigma_metrics.h"
 #include "pipelines/record/gradient_table.h"
 #include "pipelines/run/frame_start.h"
 
@@ -223,6 +224,22 @@ void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& p
   for_stages(config, progress, refinement, summary, add_all);
 }
 
+/// How sure the result's places are.
+void add_sigmas(const Clip& clip, const std::vector<SceneState>& result, const std::vector<PlaceSigmas>& sigmas,
+                RunSummary& summary) {
+  std::vector<FrameMetrics> all;
+  for (FrameMetrics& frame : summary.per_frame) {
+    const auto t = static_cast<std::size_t>(frame.frame);
+    if (t >= sigmas.size()) continue;
+    std::optional<FrameState> truth;
+    if (clip.truth) truth = placed(clip.avatar, (*clip.truth)[t], Draw::kAll);
+    all.push_back(
+        {frame.frame, sigma_values(sigmas[t], placed(clip.avatar, result[t], Draw::kAll), truth ? &*truth : nullptr)});
+    append_values(all.back().values, frame.values);
+  }
+  append_values(mean_errors(all), summary.metrics.back().values);
+}
+
 }  // namespace
 
 FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw) {
@@ -273,6 +290,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   add_image_errors(progress.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
   add_contact(config, clip, progress, refinement, summary);
   if (clip.surface) add_penetration(config, clip, progress, refinement, summary);
+  add_sigmas(clip, result_of(progress, refinement), progress.sigmas, summary);
   summary.quality = quality_of(summary.metrics.back().values, clip.frame_rate);
   return summary;
 }

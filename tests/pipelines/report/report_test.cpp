@@ -422,6 +422,32 @@ TEST_CASE("plots survive flat, single and extreme values") {
   }
 }
 
+TEST_CASE("how sure a run says that it is is shaded under its errors") {
+  const TemporaryFolder here;
+  make_run("a", "first");
+  CHECK(report_html("a").find("claimed sigma") == std::string::npos);
+  RunSummary summary = summary_named("first");
+  for (FrameMetrics& frame : summary.per_frame) {
+    for (const auto& [name, value] : {std::pair{"world_mpjpe_image_mm", 4.0},
+                                      {"world_mpjpe_depth_mm", 10.0},
+                                      {"object_translation_cm", 2.0},
+                                      {"sigma_image_mm", 3.0},
+                                      {"sigma_depth_mm", 10.0},
+                                      {"object_sigma_image_cm", 0.4},
+                                      {"object_sigma_depth_cm", 2.0}})
+      frame.values.emplace_back(name, value);
+  }
+  RunFolder("a", {"{}\n", 3, 0, "float"}, true).write_summary(summary);
+  const std::string page = report_html("a");
+  CHECK(tag_fault(page) == "");
+  CHECK(count_of(page, "<polygon ") == 3);
+  CHECK(count_of(page, "<title>claimed sigma</title>") == 3);
+  // The band of the depth ends where the error, which is as large, has its line.
+  const std::string depth = text_between(page, "world, in depth by frame", "</svg>");
+  const std::string line = text_between(depth, "<polyline points=\"", "\"");
+  CHECK_THAT(text_between(depth, "<polygon points=\"", "\""), Contains(line));
+}
+
 TEST_CASE("many iterations keep their smallest and largest losses") {
   const TemporaryFolder here;
   RunFolder folder("a", {"{}\n", 0, 1, "float"}, false);
