@@ -232,7 +232,7 @@ function(hsi4d_embed_configs)
     string(APPEND HSI4D_SHIPPED_CONFIGS "{\"${name}.json\", R\"json(${text})json\"},\n          ")
   endforeach()
   configure_file(${PROJECT_SOURCE_DIR}/cmake/shipped_configs.cpp.in ${PROJECT_BINARY_DIR}/generated/shipped_configs.cpp @ONLY)
-  target_sources(hsi4d_pipelines_cli PRIVATE ${PROJECT_BINARY_DIR}/generated/shipped_configs.cpp)
+  target_sources(hsi4d_pipelines_config PRIVATE ${PROJECT_BINARY_DIR}/generated/shipped_configs.cpp)
 endfunction()
 
 # The report's style and scripts, in the order in which they need each other, become part of the library.

@@ -16,6 +16,12 @@ if(TARGET hsi4d_python)
   install(FILES ${PROJECT_SOURCE_DIR}/python/hsi4d.pyi DESTINATION ${CMAKE_INSTALL_LIBDIR}/python)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs DESTINATION ${CMAKE_INSTALL_DATADIR}/hsi4d)
+# The front end, where the program looks for it (front_end_places).
+install(PROGRAMS ${PROJECT_SOURCE_DIR}/tools/frontend DESTINATION ${CMAKE_INSTALL_DATADIR}/hsi4d/tools)
+install(FILES ${PROJECT_SOURCE_DIR}/tools/common.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/hsi4d/tools)
+foreach(name blazepose hands track)
+  install(FILES ${PROJECT_SOURCE_DIR}/tools/services/${name}.mjs DESTINATION ${CMAKE_INSTALL_DATADIR}/hsi4d/tools/services)
+endforeach()
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/hsi4d)
 install(EXPORT hsi4d_targets NAMESPACE hsi4d:: DESTINATION ${package_dir})

@@ -6,10 +6,20 @@ hsi4d_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 say() { printf '\n== %s\n' "$*"; }
 
-fail() {
-  printf '%s: %s\n' "${0##*/}" "$*" >&2
-  exit 1
+# fail_with STATUS MESSAGE
+fail_with() {
+  printf '%s: %s\n' "${0##*/}" "${*:2}" >&2
+  exit "$1"
 }
+
+fail() { fail_with 1 "$@"; }
+
+# refuse MESSAGE: of a mistake in the command or in an input; the exit status is that of hsi4d.
+refuse() { fail_with 2 "$@"; }
+
+# The exit status where what is needed cannot be installed: later it may.
+# shellcheck disable=SC2034
+readonly not_now=75
 
 # timed TITLE COMMAND...: runs the command and prints how long it took.
 timed() {
@@ -77,13 +87,14 @@ install_debian() {
 install_chromium() {
   [[ -z $(find_chromium) ]] || return 0
   timed "install chromium" install_debian chromium "$@" ||
-    fail "there is no Chromium, and it cannot be installed (Debian package chromium); the variable CHROMIUM names one"
+    fail_with $not_now "there is no Chromium, and it cannot be installed (Debian package chromium); the variable CHROMIUM names one"
 }
 
 # provide PROGRAM PACKAGE: Debian's, where there is none.
 provide() {
   if command -v "$1" >/dev/null; then return; fi
-  timed "install $1" install_debian "$2" || fail "there is no $1, and it cannot be installed (Debian package $2)"
+  timed "install $1" install_debian "$2" ||
+    fail_with $not_now "there is no $1, and it cannot be installed (Debian package $2)"
 }
 
 # print_usage FILE: the comment at the top of a command.

@@ -20,6 +20,7 @@
 #include "pipelines/input/frame_cameras.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
+#include "pipelines/run/keypoint_motion.h"
 #include "pipelines/sources/sources.h"
 #include "splat/files/splat_file.h"
 
@@ -241,7 +242,7 @@ class Chain {
     if (has_begun && says_done(clip, folder, losses_)) {
       clip.data = made_inputs(clip);
     } else {
-      on_threads([&] { clip.data = make_sources(clip, options_.observer); });
+      on_threads([&] { clip.data = make_sources(clip, motion_maker(losses_, options_.observer), options_.observer); });
     }
     clips_[i] = facts_of_inputs(config_, i, clip.data);
     check_alike(clips_, config_);

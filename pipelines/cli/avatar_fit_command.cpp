@@ -11,10 +11,10 @@
 #include "pipelines/cli/options.h"
 #include "pipelines/cli/run_views.h"
 #include "pipelines/cli/scene_options.h"
-#include "pipelines/cli/shipped_configs.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config/config_kind.h"
+#include "pipelines/config/shipped_configs.h"
 
 namespace hsi4d::cli {
 

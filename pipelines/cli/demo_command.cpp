@@ -13,9 +13,9 @@
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
 #include "pipelines/cli/run_command.h"
-#include "pipelines/cli/shipped_configs.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/config/run_problems.h"
+#include "pipelines/config/shipped_configs.h"
 
 namespace hsi4d::cli {
 

@@ -16,8 +16,11 @@
 #include "core/npz.h"
 #include "core/safetensors.h"
 #include "core/suggest.h"
+#include "core/text.h"
+#include "core/video.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/input/frame_source.h"
 #include "splat/files/info.h"
 #include "splat/files/splat_file.h"
 
@@ -199,6 +202,27 @@ std::string exr_info(const std::string& path) {
   return text + "\n";
 }
 
+/// Whether a folder holds a .png file: frames.
+bool has_frames(const std::string& path) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(path, error))
+    if (entry.path().extension() == ".png") return true;
+  return false;
+}
+
+struct InfoArguments {
+  std::string file;
+  bool json = false;
+  std::optional<double> video_rate, frame_rate;
+};
+
+std::string info_of(const InfoArguments& a) {
+  if (!a.json && (is_video_name(a.file) || has_frames(a.file))) return video_info(a.file, a.video_rate, a.frame_rate);
+  if (a.video_rate || a.frame_rate)
+    throw UserError("hsi4d info: --video-rate and --frame-rate are of a video or a folder of frames");
+  return info_command(a.file, a.json);
+}
+
 struct Kind {
   const char* ending;
   std::string (*info)(const std::string&);
@@ -231,12 +255,26 @@ std::vector<std::string> info_endings() {
   return endings;
 }
 
+std::string video_info(const std::string& path, std::optional<double> video_rate, std::optional<double> frame_rate) {
+  check_rate(video_rate, "hsi4d info: --video-rate");
+  check_rate(frame_rate, "hsi4d info: --frame-rate");
+  const FrameSource frames(path, {video_rate.value_or(0), frame_rate.value_or(0), "--video-rate", "--frame-rate"});
+  const Image first = frames.read(0);
+  const std::string rate = frames.video_rate() > 0 ? rounded(frames.video_rate(), 6) + " a second" : "no rate is known";
+  return path + ": " + count_text(frames.video_count(), "frame") + " of " + size_text(first) + ", " + rate +
+         (frames.count() == frames.video_count() && !frame_rate
+              ? ""
+              : "; a clip of " + rounded(frames.frame_rate(), 6) + " a second has " +
+                    count_text(frames.count(), "frame")) +
+         "\n";
+}
+
 std::string info_command(const std::string& path, bool json) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
     throw UserError("hsi4d info: " + path +
-                    " is a folder; allowed: a file (`hsi4d report` and `hsi4d evaluate` tell of "
-                    "the folder of a run)");
+                    " is a folder without .png frames; allowed: a file, or a folder of frames (`hsi4d report` and "
+                    "`hsi4d evaluate` tell of the folder of a run)");
   if (json) {
     if (is_splat_file(path)) return splat_json(path);
     throw UserError("hsi4d info: --json tells of Gaussians; allowed: " + joined(splat_endings()));
@@ -252,12 +290,17 @@ std::string info_command(const std::string& path, bool json) {
 }
 
 void add_info(CLI::App& app, Program& program) {
-  auto& file = program.options<std::string>();
-  auto& json = program.options<bool>();
-  CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image, a config");
-  info->add_option("FILE", file, "A " + joined(info_endings(), " or ") + " file")->required();
-  info->add_flag("--json", json, "Print one JSON object; for Gaussians");
-  run_when_chosen(*info, program, [&] { return info_command(file, json); });
+  InfoArguments& a = program.options<InfoArguments>();
+  CLI::App* info =
+      app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image, a video, a config");
+  info->add_option("FILE", a.file, "A " + joined(info_endings(), " or ") + " file, a video, or a folder of frames")
+      ->required();
+  info->add_flag("--json", a.json, "Print one JSON object; for Gaussians");
+  info->add_option("--video-rate", a.video_rate, "Of a video: its frames a second; default: as it says")
+      ->type_name("HZ");
+  info->add_option("--frame-rate", a.frame_rate, "Of a video: the frames a second that a clip keeps; default: all")
+      ->type_name("HZ");
+  run_when_chosen(*info, program, [&] { return info_of(a); });
 }
 
 }  // namespace hsi4d::cli

@@ -1,6 +1,7 @@
 // `hsi4d info FILE`: what is in a file.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,10 @@ std::vector<std::string> info_endings();
 ///              bounds, opacity and scale with their histograms. Gaussians only.
 /// Throws UserError for another ending, and what the file's reader throws.
 std::string info_command(const std::string& path, bool json = false);
+
+/// What a clip would read of a video or a folder of frames: how many frames, their size and rate. Throws UserError and
+/// DataError as FrameSource does, in words of the command's options.
+std::string video_info(const std::string& path, std::optional<double> video_rate, std::optional<double> frame_rate);
 
 /// Lines about Gaussians: suspicious ones, bounds, opacities, scales.
 std::string statistics_text(const GaussianStatistics& statistics);

@@ -76,7 +76,9 @@ std::string sources_plan(RunConfig& config) {
   for (const SourceOutput& output : planned_sources(config)) {
     take_output(output, config.data);
     if (output.is_there) continue;
-    const std::string what = output.command.empty() ? "follow the objects" : "run " + joined(output.command);
+    const std::string what = !output.command.empty()   ? "run " + joined(output.command)
+                             : output.what == "motion" ? "find the poses of the keypoints"
+                                                       : "follow the objects";
     text += output.path.empty() ? "  would then " + what + "\n"
                                 : "  would " + what + "\n    for " + output.path.string() + "\n";
   }
@@ -118,12 +120,15 @@ std::string clip_plan(const RunConfig& chain, std::size_t index, const ClipFacts
   std::string text = name + (index == 0 ? "in its initial state\n"
                                         : "in the state in which " + chain.chain[index - 1].name + " ends\n");
   if (chain.chain[index].select_camera) text += "    would choose its camera\n";
-  const SourceSettings sources = clip_config(chain, index).sources;
-  for (const ProgramSettings* program : {static_cast<const ProgramSettings*>(&sources.video),
-                                         static_cast<const ProgramSettings*>(&sources.masks), &sources.motion})
-    if (!program->command.empty())
-      text += "    would run " + joined(program->command) + ", unless its output is there\n";
+  const RunConfig config = clip_config(chain, index);
+  const SourceSettings& sources = config.sources;
+  std::vector<std::vector<std::string>> commands = {sources.video.command};
+  if (finds_person(sources, config.data.keypoints)) commands.push_back(person_command(sources));
+  commands.insert(commands.end(), {sources.masks.command, sources.motion.command});
+  for (const std::vector<std::string>& command : commands)
+    if (!command.empty()) text += "    would run " + joined(command) + ", unless its output is there\n";
   if (sources.masks.is_embedded()) text += "    would follow the objects, unless their masks are there\n";
+  if (sources.motion.is_embedded()) text += "    would find the poses of the keypoints, unless they are there\n";
   return text;
 }
 

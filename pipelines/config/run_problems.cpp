@@ -145,7 +145,7 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
 /// Of the run, or of all clips of a chain, which may have one list of joints in common.
 void add_keypoint_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   const auto has_keypoints = [](const ChainClip& clip) { return !clip.data.keypoints.empty(); };
-  if (config.data.keypoint_joints.empty() || !config.data.keypoints.empty() ||
+  if (config.data.keypoint_joints.empty() || !config.data.keypoints.empty() || finds_person(config.sources, {}) ||
       std::any_of(config.chain.begin(), config.chain.end(), has_keypoints))
     return;
   found.push_back({"/data/keypoint_joints", "given without /data/keypoints, whose points it tells of", {"/data"}});
@@ -162,8 +162,9 @@ struct Maker {
   std::string section() const { return std::string("/sources/") + name; }
 };
 
-std::array<Maker, 3> makers_in(const SourceSettings& sources) {
+std::array<Maker, 4> makers_in(const SourceSettings& sources) {
   return {Maker{"video", sources.video.command, video_placeholders(), &DataSettings::frames, "frames"},
+          Maker{"person", sources.person.command, person_placeholders(), &DataSettings::keypoints, "keypoints"},
           Maker{"masks", sources.masks.command, mask_placeholders(), &DataSettings::masks, "masks"},
           Maker{"motion", sources.motion.command, motion_placeholders(), &DataSettings::motion, "motion"}};
 }
@@ -173,10 +174,30 @@ void add_command_problems(const SourceSettings& sources, std::vector<RunProblem>
     for (CommandFault& fault : command_faults(maker.command, maker.placeholders))
       found.push_back({maker.section() + fault.pointer, std::move(fault.text), {maker.section() + "/command"}});
   }
-  if (sources.masks.is_embedded() && !sources.masks.command.empty())
-    found.push_back({"/sources/masks/command",
-                     "given, and /sources/masks/program is \"embedded\", which makes the masks too; remove one",
-                     {"/sources/masks"}});
+  const auto add_double = [&found](const OwnSourceSettings& source, const std::string& name) {
+    const std::string section = "/sources/" + name;
+    if (source.is_embedded() && !source.command.empty())
+      found.push_back(
+          {section + "/command",
+           "given, and " + section + "/program is \"embedded\", which makes the " + name + " too; remove one",
+           {section}});
+  };
+  add_double(sources.masks, "masks");
+  add_double(sources.motion, "motion");
+}
+
+/// Nobody finds the person.
+void add_front_end_problem(const SourceSettings& sources, std::vector<RunProblem>& found) {
+  if (!person_command(sources).empty()) return;
+  std::vector<std::string> places;
+  for (const std::filesystem::path& file : front_end_places()) places.push_back(file.string());
+  found.push_back({"/sources/motion/program",
+                   "\"embedded\" without data.keypoints needs tools/frontend, which finds the person, and it is not "
+                   "there: " +
+                       joined(places) +
+                       ". Name it: \"person\": {\"command\": [\"PATH/tools/frontend\", \"{video}\", \"--out\", "
+                       "\"{out}\"]}",
+                   {"/sources"}});
 }
 
 /// @param pointer  of the prompt
@@ -197,6 +218,10 @@ void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found
       found.push_back({key, "given, and " + maker.section() + " makes it too; remove one", {key, maker.section()}});
   }
   add_prompt_problems(config.sources, "/sources/prompt", found);
+  if (config.sources.motion.is_embedded() && !config.data.motion.empty())
+    found.push_back(
+        {"/data/motion", "given, and /sources/motion makes it too; remove one", {"/data/motion", "/sources/motion"}});
+  if (finds_person(config.sources, config.data.keypoints)) add_front_end_problem(config.sources, found);
   if (config.sources.masks.is_embedded() && config.data.objects.empty() && !config.data.masks.empty())
     found.push_back({"/sources/masks/program",
                      "\"embedded\" makes nothing: data.masks has the human's masks, and there are no objects",
@@ -257,9 +282,14 @@ std::string object_names(const DataSettings& data) {
   return names.empty() ? "none" : joined(names);
 }
 
+/// Whether masks need not be given: a program makes them, or finds the human where there is nothing else.
+bool knows_masks(const SourceSettings& sources, const DataSettings& data) {
+  return makes_masks(sources) || (data.objects.empty() && finds_person(sources, data.keypoints));
+}
+
 KnownInputs known_inputs(const SourceSettings& sources, const ChainClip& clip, std::size_t index) {
   return {.video = !sources.video.command.empty(),
-          .masks = makes_masks(sources),
+          .masks = knows_masks(sources, clip.data),
           .camera = clip.select_camera,
           .state = index > 0};
 }
@@ -347,7 +377,7 @@ void add_hint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
 
 /// Headings that nothing tells apart.
 void add_keypoint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
-  if (!config.data.keypoints.empty() || !config.chain.empty()) return;
+  if (!config.data.keypoints.empty() || finds_person(config.sources, {}) || !config.chain.empty()) return;
   for (const auto& [name, stage] : config.stages) {
     const LossSettings* const loss = find_entry(stage.losses, "keypoints_2d");
     if (stage.headings > 1 && loss != nullptr && loss->weight > 0)
@@ -485,6 +515,10 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
     add_command_problems(config.sources, found);
     add_first_frame_problem(config.sources, found);
     add_idle_source_problems(config, found);
+    if (std::any_of(config.chain.begin(), config.chain.end(), [&config](const ChainClip& clip) {
+          return finds_person(sources_of(config.sources, clip), clip.data.keypoints);
+        }))
+      add_front_end_problem(config.sources, found);
     add_chain_problems(config, use, found);
     return found;
   }
@@ -492,8 +526,8 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_source_problems(config, found);
   if (use == ConfigUse::kRun) {
     const SourceSettings& sources = config.sources;
-    add_input_problems(config.data, "/data", {.video = !sources.video.command.empty(), .masks = makes_masks(sources)},
-                       found);
+    add_input_problems(config.data, "/data",
+                       {.video = !sources.video.command.empty(), .masks = knows_masks(sources, config.data)}, found);
   }
   return found;
 }

@@ -73,7 +73,30 @@ bool makes_masks(const SourceSettings& sources) {
 }
 
 bool has_sources(const SourceSettings& sources) {
-  return !sources.video.command.empty() || makes_masks(sources) || !sources.motion.command.empty();
+  return !sources.video.command.empty() || !sources.person.command.empty() || makes_masks(sources) ||
+         sources.motion.is_embedded() || !sources.motion.command.empty();
+}
+
+bool finds_person(const SourceSettings& sources, const std::filesystem::path& keypoints) {
+  return keypoints.empty() && (!sources.person.command.empty() || sources.motion.is_embedded());
+}
+
+std::vector<std::filesystem::path> front_end_places() {
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) return {};
+  std::vector<std::filesystem::path> places;
+  for (const char* from_bin : {"../share/hsi4d/tools/frontend", "../../../tools/frontend"})
+    places.push_back((program.parent_path() / from_bin).lexically_normal());
+  return places;
+}
+
+std::vector<std::string> person_command(const SourceSettings& sources) {
+  if (!sources.person.command.empty()) return sources.person.command;
+  for (const std::filesystem::path& file : front_end_places()) {
+    if (!find_program(file.string()).empty()) return {file.string(), "--no-install", "{video}", "--out", "{out}"};
+  }
+  return {};
 }
 
 void describe(ConfigFields& f, VideoSourceSettings& s) {
@@ -83,25 +106,38 @@ void describe(ConfigFields& f, VideoSourceSettings& s) {
   f.integer("frames", s.frames, {.min = 0, .max = 1000000}, "Frames that the video must have; 0: any number");
 }
 
-void describe(ConfigFields& f, MaskSourceSettings& s) {
-  describe_program(f, s, mask_placeholders());
-  f.choice("program", s.program, kMaskPrograms,
-           "Who makes them: `command`, or hsi4d itself, from frame 0 on (embedded); data.masks, if given, then has the "
-           "human's");
-}
-
 void describe(ConfigFields& f, SourceSettings& s) {
   f.path("folder", s.folder, {}, "Where videos, masks and motions are kept; empty: generated/ beside the config");
   f.string("prompt", s.prompt, "What happens in the video: {prompt}");
   f.object("video", s.video, "The program that makes the video of an image and a text");
-  f.object("masks", s.masks, "The program that makes the masks of the video");
   f.object(
-      "motion", s.motion, "The program that estimates the human's poses in the video",
-      [](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, motion_placeholders()); });
+      "person", s.person,
+      "The program that finds the human in the video: keypoints, and masks where no other has them; without a "
+      "command tools/frontend, where motion is embedded",
+      [](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, person_placeholders()); });
+  f.object("masks", s.masks, "The program that makes the masks of the video",
+           [](ConfigFields& fields, OwnSourceSettings& masks) {
+             describe_program(fields, masks, mask_placeholders());
+             fields.choice("program", masks.program, kSourcePrograms,
+                           "Who makes them: `command`, or hsi4d itself, from frame 0 on (embedded); data.masks, if "
+                           "given, then has the human's, else what finds the person");
+           });
+  f.object("motion", s.motion, "The program that estimates the human's poses in the video",
+           [](ConfigFields& fields, OwnSourceSettings& motion) {
+             describe_program(fields, motion, motion_placeholders());
+             fields.choice("program", motion.program, kSourcePrograms,
+                           "Who estimates them: `command`, or hsi4d itself, from keypoints (embedded): those of "
+                           "data.keypoints, if given, else what finds the person");
+           });
 }
 
 const std::vector<std::string>& video_placeholders() {
   static const std::vector<std::string> names = {"first_frame", "prompt", "seed", "out"};
+  return names;
+}
+
+const std::vector<std::string>& person_placeholders() {
+  static const std::vector<std::string> names = {"video", "out"};
   return names;
 }
 

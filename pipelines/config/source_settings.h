@@ -1,5 +1,6 @@
 // Config section `sources`: programs outside that make the video, the masks and the estimated motion of a run: an
-// image-to-video model, a segmenter, a pose estimator. docs/services.md tells them what is expected of them.
+// image-to-video model, a detector of people, a segmenter, a pose estimator. docs/services.md tells them what is
+// expected of them.
 //
 // A command is a list of arguments, the program first; no shell reads them. In any argument stand for themselves all
 // characters but placeholders, {word}, which are replaced; {{word}} is {word}.
@@ -50,18 +51,17 @@ struct VideoSourceSettings : ProgramSettings {
   Index frames = 0;  ///< that the video must have; 0: any number
 };
 
-/// Who makes the masks.
-enum class MaskProgram { kCommand, kEmbedded };
+/// Who makes masks or poses.
+enum class SourceProgram { kCommand, kEmbedded };
 
-inline constexpr std::array<ConfigChoice<MaskProgram>, 2> kMaskPrograms = {
-    {{MaskProgram::kCommand, "command"}, {MaskProgram::kEmbedded, "embedded"}}};
+inline constexpr std::array<ConfigChoice<SourceProgram>, 2> kSourcePrograms = {
+    {{SourceProgram::kCommand, "command"}, {SourceProgram::kEmbedded, "embedded"}}};
 
-/// The program that makes the masks of the video: a command, or this one (pipelines/follow), which makes those of the
-/// objects.
-struct MaskSourceSettings : ProgramSettings {
-  MaskProgram program = MaskProgram::kCommand;  ///< embedded: data.masks, if given, has the human's
+/// A command, or this program.
+struct OwnSourceSettings : ProgramSettings {
+  SourceProgram program = SourceProgram::kCommand;
 
-  bool is_embedded() const { return program == MaskProgram::kEmbedded; }
+  bool is_embedded() const { return program == SourceProgram::kEmbedded; }
 };
 
 /// Config section `sources`.
@@ -69,9 +69,21 @@ struct SourceSettings {
   std::filesystem::path folder;  ///< of what was made; empty: "generated" beside the config
   std::string prompt;            ///< what happens in the video
   VideoSourceSettings video;
-  MaskSourceSettings masks;  ///< of the video
-  ProgramSettings motion;    ///< poses of the human in the video
+  ProgramSettings person;    ///< keypoints and masks of the human in the video
+  OwnSourceSettings masks;   ///< embedded: pipelines/follow makes those of the objects; the human's are known before
+  OwnSourceSettings motion;  ///< poses of the human in the video; embedded: of its keypoints
 };
+
+/// Whether the human is looked for in the video: by sources.person or, where this program makes the motion and no
+/// keypoints are given, by the front end.
+bool finds_person(const SourceSettings& sources, const std::filesystem::path& keypoints);
+
+/// The command that does: that of sources.person, else the front end's where it is installed beside this program, or in
+/// the source tree that this program was built in. Empty: there is none.
+std::vector<std::string> person_command(const SourceSettings& sources);
+
+/// The files at which the front end is looked for.
+std::vector<std::filesystem::path> front_end_places();
 
 /// Whether a command, or this program, makes the masks.
 bool makes_masks(const SourceSettings& sources);
@@ -81,7 +93,6 @@ bool has_sources(const SourceSettings& sources);
 
 /// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, VideoSourceSettings& settings);
-void describe(ConfigFields& fields, MaskSourceSettings& settings);
 void describe(ConfigFields& fields, SourceSettings& settings);
 
 /// Settings of a program that its output does not depend on.
@@ -89,6 +100,7 @@ const std::vector<std::string>& settings_of_trying();
 
 /// Placeholders that commands may have.
 const std::vector<std::string>& video_placeholders();
+const std::vector<std::string>& person_placeholders();
 const std::vector<std::string>& mask_placeholders();
 const std::vector<std::string>& motion_placeholders();
 

@@ -165,15 +165,15 @@ double rate_of_video(const fs::path& path, double of_file, const FrameRates& rat
   const double video = rates.video > 0 ? rates.video : of_file;
   if (rates.kept > 0 && video == 0)
     throw UserError(path.string() + ": does not say how many frames a second it has, so that " +
-                    number_text(rates.kept) + " of them cannot be kept; data.video_rate says it");
+                    number_text(rates.kept) + " of them cannot be kept; " + rates.video_word + " says it");
   return video;
 }
 
 /// @param video  frames a second, where they follow each other as usual
-void check_kept_rate(const fs::path& path, double video, double kept) {
-  if (kept > video * (1 + 1e-9))
-    throw UserError(path.string() + ": has " + rounded(video, 8) + " frames a second; data.frame_rate, " +
-                    number_text(kept) + ", cannot be more");
+void check_kept_rate(const fs::path& path, double video, const FrameRates& rates) {
+  if (rates.kept > video * (1 + 1e-9))
+    throw UserError(path.string() + ": has " + rounded(video, 8) + " frames a second; " + rates.kept_word + ", " +
+                    number_text(rates.kept) + ", cannot be more");
 }
 
 /// "but frame 4 comes 0.2333 s after frame 3", as the frames before do not.
@@ -186,19 +186,20 @@ std::string gap_text(const FrameTimes& times) {
 
 /// The frames of a video that are nearest to the moments of the kept rate, where they are not equally far apart in
 /// time.
-std::vector<Index> frames_by_time(const fs::path& path, const FrameTimes& times, double kept) {
+std::vector<Index> frames_by_time(const fs::path& path, const FrameTimes& times, const FrameRates& rates) {
+  const double kept = rates.kept;
   if (kept == 0)
-    throw UserError(path.string() + ": its frames " + gap_text(times) +
-                    "; set data.frame_rate, for which the nearest ones in time are taken, or data.video_rate, if they "
-                    "are equally far apart in truth");
-  check_kept_rate(path, 1 / usual_step(times), kept);
+    throw UserError(path.string() + ": its frames " + gap_text(times) + "; set " + rates.kept_word +
+                    ", for which the nearest ones in time are taken, or " + rates.video_word +
+                    ", if they are equally far apart in truth");
+  check_kept_rate(path, 1 / usual_step(times), rates);
   const double count = std::floor(times.seconds.back() * kept) + 1,
                most = kMostRepeats * static_cast<double>(times.seconds.size());
   if (count > most)
     throw DataError(path.string() + ": its frames " + gap_text(times) + ", so that " + number_text(kept) +
                     " a second would make " + rounded(count, 6) + " of its " + std::to_string(times.seconds.size()) +
-                    "; allowed: at most " + rounded(most, 6) +
-                    ". Cut the video there, or set data.video_rate if its frames are equally far apart in truth");
+                    "; allowed: at most " + rounded(most, 6) + ". Cut the video there, or set " + rates.video_word +
+                    " if its frames are equally far apart in truth");
   const std::vector<Index> numbers = nearest_frames(times, kept);
   Index repeated = 0;
   for (std::size_t t = 1; t < numbers.size(); ++t) repeated += numbers[t] == numbers[t - 1] ? 1 : 0;
@@ -262,9 +263,9 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
   video_rate_ = rate_of_video(path, video_ ? video_->reader.frame_rate() : 0, rates);
   is_uneven_ = video_ && rates.video == 0 && !are_even(video_->reader.times());
   if (is_uneven_) {
-    numbers_ = frames_by_time(path, video_->reader.times(), rates.kept);
+    numbers_ = frames_by_time(path, video_->reader.times(), rates);
   } else {
-    if (rates.kept > 0) check_kept_rate(path, video_rate_, rates.kept);
+    if (rates.kept > 0) check_kept_rate(path, video_rate_, rates);
     numbers_ = kept_frames(video_count_, video_rate_, rates.kept);
   }
   frame_rate_ = rates.kept > 0 ? rates.kept : video_rate_;

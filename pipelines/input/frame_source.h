@@ -16,8 +16,10 @@ namespace hsi4d {
 
 /// Which frames of a video a clip keeps.
 struct FrameRates {
-  double video = 0;  ///< frames a second of the video; 0: what its file says
-  double kept = 0;   ///< frames a second that are kept, the nearest ones; 0: all
+  double video = 0;                            ///< frames a second of the video; 0: what its file says
+  double kept = 0;                             ///< frames a second that are kept, the nearest ones; 0: all
+  const char* video_word = "data.video_rate";  ///< what messages call them
+  const char* kept_word = "data.frame_rate";
 };
 
 namespace detail {

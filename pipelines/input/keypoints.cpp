@@ -251,6 +251,24 @@ std::vector<FoundPerson> own_landmarks(const ConfigValue& tree, const FoundKeypo
   return all;
 }
 
+/// [0.93, ...]: as many as frames.
+std::vector<double> own_scores(const ConfigValue& tree, std::size_t frames) {
+  const ConfigValue* const list = find_member(tree, "scores");
+  if (list == nullptr) return {};
+  check_kind(*list, Kind::kArray, "/scores");
+  if (list->items.size() != frames)
+    fail_at(*list, "/scores",
+            "has " + std::to_string(list->items.size()) + " numbers; /frames has " + std::to_string(frames));
+  std::vector<double> scores;
+  for (std::size_t t = 0; t < frames; ++t) {
+    const std::string pointer = "/scores/" + std::to_string(t);
+    scores.push_back(number_of(list->items[t], pointer));
+    if (!(scores.back() >= 0 && scores.back() <= 1))
+      fail_at(list->items[t], pointer, list->items[t].text + " is out of range; allowed: 0 to 1");
+  }
+  return scores;
+}
+
 FoundKeypoints read_own(const ConfigValue& tree, const std::vector<KeypointJoints>& joints) {
   const ConfigValue* const version = find_member(tree, "version");
   if (version != nullptr && number_of(*version, "/version") != 1)
@@ -270,6 +288,7 @@ FoundKeypoints read_own(const ConfigValue& tree, const std::vector<KeypointJoint
     found.frames.back().push_back(person);
   }
   found.landmarks = own_landmarks(tree, found);
+  found.scores = own_scores(tree, found.frames.size());
   return found;
 }
 
@@ -387,6 +406,19 @@ void tell_empty_frames(const Keypoints& keypoints, const std::string& file) {
               "); losses of keypoints are off there");
 }
 
+/// Frames of somebody who is found doubtfully.
+void tell_doubtful_frames(const Keypoints& keypoints, const std::vector<const FoundPerson*>& persons,
+                          const std::string& file) {
+  std::vector<Index> doubtful;
+  for (std::size_t t = 0; t < keypoints.scores.size(); ++t) {
+    if (persons[t] != nullptr && keypoints.scores[t] < kDoubtfulScore) doubtful.push_back(static_cast<Index>(t));
+  }
+  if (doubtful.empty()) return;
+  log_warning(file + ": the person is found doubtfully in " + std::to_string(doubtful.size()) + " of " +
+              std::to_string(keypoints.frames.size()) + " frames (" + frame_ranges(doubtful) + "), scores below " +
+              number_text(kDoubtfulScore));
+}
+
 }  // namespace
 
 FoundKeypoints read_found_keypoints(const fs::path& path, const std::vector<KeypointJoints>& joints) {
@@ -498,7 +530,9 @@ Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames) {
       points[k].landmark = Vector3<double>(landmarks[t][used[k]].data());
     }
   }
+  if (!found.scores.empty()) keypoints.scores = kept_frames(found.scores, frames, file, "scores of keypoints");
   tell_empty_frames(keypoints, file);
+  tell_doubtful_frames(keypoints, persons, file);
   return keypoints;
 }
 

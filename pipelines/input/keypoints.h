@@ -22,6 +22,9 @@ namespace hsi4d {
 /// Confidence from which a point counts as found.
 inline constexpr double kFoundConfidence = 0.5;
 
+/// Score below which a person counts as doubtful in a frame.
+inline constexpr double kDoubtfulScore = 0.5;
+
 /// A point as a detector found it.
 struct Keypoint {
   double x = 0, y = 0;    ///< shares of the image's width and height, from its upper left corner
@@ -40,6 +43,7 @@ using Bone = std::vector<std::pair<int, double>>;
 struct Keypoints {
   std::vector<KeypointJoints> joints;         ///< by point
   std::vector<std::vector<Keypoint>> frames;  ///< [frame][point], of the frames that the clip keeps
+  std::vector<double> scores;  ///< [frame] how well the person was found, 0 to 1; empty: the file does not say
 
   bool has_landmarks() const;
 };
@@ -55,6 +59,7 @@ using FoundPerson = std::vector<std::array<double, 3>>;
 struct FoundKeypoints {
   std::vector<std::vector<FoundPerson>> frames;  ///< [frame][person], all persons with the same points
   std::vector<FoundPerson> landmarks;            ///< [frame] of the one person, (x, y, z); empty: there are none
+  std::vector<double> scores;                    ///< [frame] of the one person, 0 to 1; empty: there are none
   std::vector<KeypointJoints> joints;            ///< by point, empty where it stands for no joint
   std::array<double, 2> size = {0, 0};           ///< of the pictures, pixels; 0: that of the video's
   bool lacks_empty_frames = false;               ///< frames without persons are not in the file

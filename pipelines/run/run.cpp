@@ -18,6 +18,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
+#include "pipelines/run/keypoint_motion.h"
 #include "pipelines/run/lens_estimate.h"
 #include "pipelines/run/pixel_filter.h"
 #include "pipelines/sources/sources.h"
@@ -224,7 +225,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   on_threads(threads, [&] {
     if (!has_sources(config.sources)) return;
     look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
-    config.data = make_sources(config, options.observer);
+    config.data = make_sources(config, motion_maker(losses, options.observer), options.observer);
   });
   Clip clip = read_run_clip(config, losses);                                           // before anything is written
   if (config.body.kind == BodyKind::kSmplx && !clip.body) body_model_of(config.body);  // what is wrong shows now

@@ -26,7 +26,8 @@ fs::path output_of_work(const fs::path& work) {
       number.size() > 1 && std::all_of(number.begin() + 1, number.end(), [](char c) { return c >= '0' && c <= '9'; });
   const std::string name = numbered.stem().string();
   if (work.extension() != ".tmp" || !is_number ||
-      !(name.starts_with("video-") || name.starts_with("masks-") || name.starts_with("motion-")))
+      !(name.starts_with("video-") || name.starts_with("person-") || name.starts_with("masks-") ||
+        name.starts_with("motion-")))
     return {};
   return work.parent_path() / name;
 }

@@ -8,9 +8,11 @@
 #include "core/process.h"
 #include "optim/checkpoint.h"
 #include "pipelines/config/masks.h"
+#include "pipelines/config/parameter_groups.h"
 #include "pipelines/follow/follow.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/input_hashes.h"
+#include "pipelines/input/keypoints.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
@@ -172,6 +174,34 @@ SourceOutput video_output(const RunConfig& config) {
   const SourceOutput output = output_of(config, "video", video.command, record, ending_of(video.output));
   if (output.is_there && video.frames > 0) check_length(config, output.path);
   return output;
+}
+
+SourceOutput person_output(const RunConfig& config, const DataSettings& data) {
+  const std::vector<std::string> command = person_command(config.sources);
+  ConfigValue record = command_record(config, command);
+  record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
+  return output_of(config, "person", command, record, "");
+}
+
+bool finds_first_frame(const RunConfig& config) {
+  return std::any_of(config.stages.begin(), config.stages.end(), [](const auto& entry) {
+    const auto& [name, stage] = entry;
+    return stage.over == StageScope::kFirst && find_entry(stage.optimize, kTranslGroup) != nullptr;
+  });
+}
+
+SourceOutput embedded_motion_output(const RunConfig& config, const DataSettings& data) {
+  std::vector<ClipFile> files;
+  for (const fs::path& file : keypoint_files(data.keypoints)) files.push_back({std::to_string(files.size()), file});
+  if (!data.keypoint_joints.empty()) files.push_back({"joints", data.keypoint_joints});
+  ConfigValue record = ConfigValue::make_object();
+  record.add("method", ConfigValue::make_integer(kKeypointMotionMethod));
+  record.add("keypoints", ConfigValue::make_string(input_hashes(files)));
+  record.add("first_frame", first_frame_record(config));
+  record.add("finds_first", ConfigValue::make_boolean(finds_first_frame(config)));
+  record.add("video_rate", ConfigValue::make_number(data.video_rate));
+  record.add("frame_rate", ConfigValue::make_number(data.frame_rate));
+  return output_of(config, "motion", {}, record, ".npz");
 }
 
 SourceOutput motion_output(const RunConfig& config, const DataSettings& data) {

@@ -21,6 +21,7 @@
 #include "pipelines/follow/pictures.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/frame_cameras.h"
+#include "pipelines/input/keypoints.h"
 #include "pipelines/input/pose_estimate.h"
 #include "pipelines/sources/lock.h"
 #include "pipelines/sources/record.h"
@@ -88,6 +89,16 @@ void check_masks(const DataSettings& data, const fs::path& folder) {
                       size_text(mask) + " pixels, the video's frame " + size_text(frame));
     }
   }
+}
+
+void check_person(const DataSettings& asked, const fs::path& folder) {
+  if (!fs::is_directory(folder))
+    throw DataError(std::string("is no folder; ") + kPersonKeypoints + " and " + kPersonMasks + "/human/ are in it");
+  DataSettings data = asked;
+  data.keypoints = folder / kPersonKeypoints;
+  data.objects = {};
+  read_keypoints(data, frames_of(data));
+  check_masks(data, folder / kPersonMasks);
 }
 
 void check_motion(const DataSettings& data, const fs::path& file) {
@@ -299,6 +310,16 @@ void make_masks(const RunConfig& config, const DataSettings& data, const SourceO
        [&data](const fs::path& made) { check_masks(data, made); });
 }
 
+void make_person(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
+                 const Observer& observer) {
+  const WorkFolder work(work_folder_of(output.path));
+  const fs::path out = work.member("person");
+  const std::vector<std::string> command =
+      filled_in(output.command, {{"video", data.frames.string()}, {"out", out.string()}});
+  make(Job{output, config.sources.person, command, out, observer},
+       [&data](const fs::path& made) { check_person(data, made); });
+}
+
 ObjectHint hint_of(const ObjectSettings& object) {
   ObjectHint hint{object.first_mask, object.first_box, {}};
   for (std::size_t i = 0; i + 1 < object.first_clicks.size(); i += 2)
@@ -354,6 +375,26 @@ void make_embedded_masks(const RunConfig& config, const DataSettings& data, cons
   log_info("masks: " + output.path.string() + "; " + (output.path / kSheetFile).string() + " shows them");
 }
 
+void make_embedded_motion(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
+                          const MotionMaker& make_motion) {
+  const WorkFolder work(work_folder_of(output.path));
+  const fs::path out = work.member("motion.npz");
+  RunConfig with_inputs = config;
+  with_inputs.data = data;
+  log_info("motion: is found of " + data.keypoints.string());
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    make_motion(with_inputs, work.member("run"), out);
+  } catch (const Interrupted&) {
+    throw Interrupted("interrupted while the motion was found of keypoints; nothing is left of it");
+  }
+  check_motion(data, out);
+  write_text_file(record_file(output).string(), output.record);
+  put(out, output.path);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+  log_info("motion: " + output.path.string() + ", made in " + duration_text(taken.count()));
+}
+
 void make_motion(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
                  const Observer& observer) {
   const WorkFolder work(work_folder_of(output.path));
@@ -401,6 +442,11 @@ fs::path made(const Plan& plan, const Observer& observer, const Make& make_it) {
   return now.path;
 }
 
+/// Whether masks are made here: where the human's are known and there are no objects, nothing is left to make.
+bool follows_objects(const RunConfig& config, const DataSettings& data) {
+  return config.sources.masks.is_embedded() && !(data.objects.empty() && !data.masks.empty());
+}
+
 }  // namespace
 
 double seconds_before_retry(const ProgramSettings& settings, int retry) {
@@ -416,37 +462,63 @@ std::vector<SourceOutput> planned_sources(const RunConfig& config) {
     has_video = outputs.back().is_there;
     take_output(outputs.back(), data);
   }
-  const auto plan = [&](const std::string& what, const std::vector<std::string>& command, const auto& output) {
-    if (!command.empty())
-      outputs.push_back(has_video ? output(config, data) : SourceOutput{what, command, {}, "", false});
+  // What it is made of is there: then its name is known.
+  const auto plan = [&](bool is_known, const std::string& what, const std::vector<std::string>& command,
+                        const auto& output) {
+    outputs.push_back(is_known ? output(config, data) : SourceOutput{what, command, {}, "", false});
   };
-  if (config.sources.masks.is_embedded()) {
-    outputs.push_back(has_video ? embedded_mask_output(config, data) : SourceOutput{"masks", {}, {}, "", false});
-  } else {
-    plan("masks", config.sources.masks.command, mask_output);
+  bool has_person = has_video;
+  if (finds_person(config.sources, data.keypoints)) {
+    plan(has_video, "person", person_command(config.sources), person_output);
+    has_person = outputs.back().is_there;
+    take_output(outputs.back(), data);
   }
-  plan("motion", config.sources.motion.command, motion_output);
+  if (follows_objects(config, data)) {
+    plan(has_person, "masks", {}, embedded_mask_output);
+  } else if (!config.sources.masks.command.empty()) {
+    plan(has_video, "masks", config.sources.masks.command, mask_output);
+  }
+  if (config.sources.motion.is_embedded()) {
+    plan(has_person, "motion", {}, embedded_motion_output);
+  } else if (!config.sources.motion.command.empty()) {
+    plan(has_video, "motion", config.sources.motion.command, motion_output);
+  }
   return outputs;
 }
 
 void take_output(const SourceOutput& output, DataSettings& data) {
+  if (output.what == "person") {
+    data.keypoints = output.path / kPersonKeypoints;
+    if (data.masks.empty()) data.masks = output.path / kPersonMasks;
+    return;
+  }
   (output.what == "video" ? data.frames : output.what == "masks" ? data.masks : data.motion) = output.path;
 }
 
-DataSettings make_sources(const RunConfig& config, const Observer& observer) {
+DataSettings make_sources(const RunConfig& config, const MotionMaker& make_poses, const Observer& observer) {
   DataSettings data = config.data;
   if (!config.sources.video.command.empty()) {
     data.frames = made([&] { return video_output(config); }, observer,
                        [&](const SourceOutput& video) { make_video(config, video, observer); });
   }
-  if (config.sources.masks.is_embedded()) {
+  if (finds_person(config.sources, data.keypoints)) {
+    SourceOutput person;
+    person.what = "person";
+    person.path = made([&] { return person_output(config, data); }, observer,
+                       [&](const SourceOutput& output) { make_person(config, data, output, observer); });
+    take_output(person, data);
+  }
+  if (follows_objects(config, data)) {
     data.masks = made([&] { return embedded_mask_output(config, data); }, observer,
                       [&](const SourceOutput& masks) { make_embedded_masks(config, data, masks, observer); });
   } else if (!config.sources.masks.command.empty()) {
     data.masks = made([&] { return mask_output(config, data); }, observer,
                       [&](const SourceOutput& masks) { make_masks(config, data, masks, observer); });
   }
-  if (!config.sources.motion.command.empty()) {
+  if (config.sources.motion.is_embedded()) {
+    data.motion = made([&] { return embedded_motion_output(config, data); }, observer,
+                       [&](const SourceOutput& motion) { make_embedded_motion(config, data, motion, make_poses); });
+  } else if (!config.sources.motion.command.empty()) {
     data.motion = made([&] { return motion_output(config, data); }, observer,
                        [&](const SourceOutput& motion) { make_motion(config, data, motion, observer); });
   }

@@ -3,6 +3,7 @@
     python3 tests/tools/frontend_input_test.py TOOLS      # the folder tools/
 """
 
+import hashlib
 import os
 import pathlib
 import shutil
@@ -14,12 +15,13 @@ tools = pathlib.Path(sys.argv[1]).resolve()
 
 # What the scripts call beside Node and Chromium.
 needed = ["bash", "env", "dirname", "head", "sed", "mkdir", "mktemp", "rm", "mv", "grep"]
+wrong, not_now = 2, 75  # exit statuses: a mistake in the command or an input; something cannot be installed
 
 
-def run(*words, env=None):
+def run(*words, env=None, status=wrong):
     """What it says; it has to fail."""
     result = subprocess.run([str(word) for word in words], capture_output=True, text=True, env=env)
-    assert result.returncode == 1, f"exit status {result.returncode}: {result.stdout}{result.stderr}"
+    assert result.returncode == status, f"exit status {result.returncode}: {result.stdout}{result.stderr}"
     return result.stdout + result.stderr
 
 
@@ -62,15 +64,89 @@ assert.deepStrictEqual(far.points[7], [50, 80, 0]);
 assert.strictEqual(far.places.length, 21);
 """
 
+# Points over time: a person of 100 px whose points stand in a column and walk 2 px a frame to the right.
+TRACK = """
+import assert from 'node:assert';
+import { byBytes, jumpsOf, scoresOf, smoothed, valueAtZero } from '%s';
+
+// As std::sort orders names: by bytes, not by the units of UTF-16, and whatever their lengths.
+assert.deepStrictEqual(['10.png', '9.png', '\\u00e9.png', 'z.png', '\\u{10000}.png', '\\uffff.png'].sort(byBytes),
+  ['10.png', '9.png', 'z.png', '\\u00e9.png', '\\uffff.png', '\\u{10000}.png']);
+
+const person = (x, visibility = 1) => Array.from({ length: 33 }, (_, i) => [x, 100 * i / 32, visibility]);
+const near = (a, b, most = 1e-9) => assert(Math.abs(a - b) < most, `${a} is not ${b}`);
+const scores = (frames) => scoresOf(frames).map(({ score }) => score);
+
+const walk = [0, 2, 4, 6, 8].map((x) => person(x));
+scores(walk.slice(1, 4)).slice(1, 2).forEach((score) => near(score, 1)); // between its neighbours
+near(scores(walk)[0], 1 - 2 / 50); // at the end: 2 px from its neighbour, of half its height
+assert.deepStrictEqual(jumpsOf(walk), []);
+const leaping = walk.with(2, person(34)); // 30 px off, 60 %% of what is another person's
+near(scores(leaping)[2], 0.4);
+near(scores(leaping)[1], 1 - 15 / 50);
+assert(!scoresOf(leaping)[2].isSteady && scoresOf(leaping)[2].isSeen);
+near(scores(walk.with(2, person(64)))[2], 0); // never below 0
+assert.deepStrictEqual(jumpsOf(walk.with(2, person(64))), [2, 3]);
+near(scores(walk.with(2, person(4, 0.8)))[2], 0.8); // as visible as the limbs are
+near(scores([person(0).map(([x, y], i) => [x, y, i < 11 ? 0.2 : 1])])[0], 22 / 33); // the share that is seen; no neighbour
+assert.deepStrictEqual(scoresOf([[]])[0], { score: 0, isSeen: false, isSteady: true });
+
+// Least squares with weights: a curve is met, noise is not, what has no weight is nothing.
+near(valueAtZero([[-2, 7, 1], [-1, 4, 0.5], [1, 4, 1], [2, 7, 0.1]], 2), 3);
+near(valueAtZero([[-1, 0, 1], [0, 3, 1], [1, 0, 1]], 1), 1);
+near(valueAtZero([[-1, 0, 1], [0, 3, 2], [1, 0, 1]], 1), 1.5);
+assert.strictEqual(valueAtZero([[1, 5, 0], [2, 5, 0], [3, 5, 0]], 2), undefined);
+
+// Curves of time stay as they are, at both ends too; noise becomes less; whoever else comes is another track.
+const curve = Array.from({ length: 12 }, (_, t) => person(t * t));
+const places = curve.map((points) => points.map(([x, y]) => [x / 100, y / 100, x / 50]));
+const same = smoothed(curve, places, 7);
+same.points.forEach((points, t) => points.forEach((point, i) => point.forEach((number, k) => near(number, curve[t][i][k], 1e-6))));
+same.places.forEach((rows, t) => rows.forEach((row, i) => row.forEach((number, k) => near(number, places[t][i][k], 1e-6))));
+const noisy = Array.from({ length: 12 }, (_, t) => person(t %% 2));
+const calm = smoothed(noisy, noisy, 7).points.map((points) => points[0][0]);
+assert(calm.slice(3, 9).every((x) => Math.abs(x - 0.5) < 0.2), `${calm}`);
+const cut = [...walk, [], ...walk.map((points) => points.map(([x, y, v]) => [x + 500, y, v]))];
+const apart = smoothed(cut, cut, 9).points;
+cut.forEach((points, t) => points.forEach(([x], i) => near(apart[t][i][0], x, 1e-6)));
+const jump = [...walk, ...walk.map((points) => points.map(([x, y, v]) => [x + 500, y, v]))];
+jump.forEach((points, t) => near(smoothed(jump, jump, 9).points[t][3][0], points[3][0], 1e-6));
+const hidden = noisy.map((points, t) => points.map(([x, y]) => [x, y, t === 5 ? 0 : 1]));
+near(smoothed(hidden, hidden, 7).points[5][0][0], hidden[5][0][0]); // what is not found stays where it is said to be
+"""
+
+# hsi4d: notes how it was called, and says of the camera what the file `word` has.
+STAND_IN = """#!/bin/bash
+cd "$(dirname "$0")" || exit
+echo "$*" >>calls.txt
+case $1 in
+  info) [[ ! -e refused ]] || { cat refused >&2; exit 2; } ;;
+  locate) echo "  PSNR of the compared pixels: 9.0 dB before, 9.1 dB ($(cat word))"; while [[ $1 != --out ]]; do shift; done; touch "$2" ;;
+  init) while [[ $1 != --out ]]; do shift; done; mkdir "$2" ;;
+esac
+"""
+
 with tempfile.TemporaryDirectory() as name:
     here = pathlib.Path(name)
     video = here / "video.mp4"
     video.write_text("no video")
     frontend = [tools / "frontend", video, "--out", here / "found", "--packages", here / "packages"]
-    assert "there is no node, and it cannot be installed (Debian package nodejs)" in run(*frontend, env=path_with(here / "a", ["ffmpeg"]))
-    assert "there is no ffmpeg, and it cannot be installed (Debian package ffmpeg)" in run(*frontend, env=path_with(here / "b", ["node"]))
-    said = run(*frontend, env=path_with(here / "c", ["node", "ffmpeg"]))
+    no_node, no_ffmpeg = path_with(here / "a", ["ffmpeg"]), path_with(here / "b", ["node"])
+    no_chromium = path_with(here / "c", ["node", "ffmpeg"])
+    assert "there is no node, and it cannot be installed (Debian package nodejs)" in run(*frontend, env=no_node, status=not_now)
+    assert "there is no ffmpeg, and it cannot be installed (Debian package ffmpeg)" in run(*frontend, env=no_ffmpeg, status=not_now)
+    said = run(*frontend, env=no_chromium, status=not_now)
     assert "there is no Chromium, and it cannot be installed (Debian package chromium)" in said, said
+    # What must not install says how to, and does nothing.
+    (here / "packages").rmdir()
+    quietly = [*frontend, "--no-install"]
+    how = f"tools/frontend --install --packages {here}/packages installs it"
+    assert f"there is no node (Debian package nodejs); {tools.parent}/{how}" in run(*quietly, env=no_node)
+    assert "there is no Chromium (Debian package chromium); " in run(*quietly, env=no_chromium)
+    with_all = path_with(here / "e", ["node", "ffmpeg", "chromium"])
+    assert f"BlazePose is not there; {tools.parent}/{how}" in run(*quietly, env=with_all)
+    assert not (here / "packages").exists()
+    assert "say the opposite" in run(*quietly, "--install")
 
     # A package that is not whole.
     pose = here / "packages/node_modules/@mediapipe/pose"
@@ -78,7 +154,7 @@ with tempfile.TemporaryDirectory() as name:
     (here / "packages/node_modules/playwright-core").mkdir()
     for file in ["pose.js", "pose_landmark_full.tflite", "pose_web.binarypb", "pose_solution_packed_assets.data"]:
         (pose / file).write_text("something")
-    whole = path_with(here / "d", ["node", "ffmpeg", "chromium"])
+    whole = with_all
     said = run(*frontend, "--model", "heavy", env=whole)
     assert "pose_landmark_heavy.tflite is missing; remove " in said and "--install" in said, said
     (pose / "pose_web.binarypb").write_text("")
@@ -95,9 +171,18 @@ with tempfile.TemporaryDirectory() as name:
     # A hand is that at BlazePose's wrist, in pixels of the frame.
     if shutil.which("node"):
         run_node(HANDS % (tools / "services/hands.mjs").as_uri())
+        run_node(TRACK % (tools / "services/track.mjs").as_uri())
+        # A clip has two frames; this is known before the browser begins.
+        (here / "one").mkdir()
+        (here / "one/0.png").write_text("a picture")
+        blazepose = ["node", tools / "services/blazepose.mjs", "--packages", here, "--model", "full", "--out", here / "x"]
+        assert f"{here}/one has 1 .png frames; allowed: two or more" in run(*blazepose, "--frames", here / "one")
+        assert "the video has 1 frames" in run(*blazepose, "--frames", here / "one", "--numbered")
 
     assert "allowed: lite, full, heavy" in run(*frontend, "--model", "best")
     assert "allowed: X0,Y0,X1,Y1, whole pixels of the first frame" in run(*frontend, "--person", "1,2,3")
+    for frames in ["2", "4", "1", "101", "five", "-3"]:
+        assert "allowed: odd ones from 3 to 99" in run(*frontend, "--smooth", frames)
     assert "there is no such file" in run(tools / "frontend", here / "none.mp4", "--out", here / "x")
     from_video = [tools / "from_video", video, "--out", here / "x"]
     assert "--fov needs --scene" in run(*from_video, "--fov", "60")
@@ -111,14 +196,60 @@ with tempfile.TemporaryDirectory() as name:
     assert "is there and no folder" in run(tools / "from_video", video, "--out", video)
     assert "tools/frontend makes them" in run(*from_video, "--masks", here)
     assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x")
+    for option in ["--frame-rate", "--video-rate", "--camera-height", "--focal-px", "--longest-side-px"]:
+        assert f"{option}: abc is no number" in run(*from_video, option, "abc")
+    assert "--threads: two is no number of threads" in run(*from_video, "--threads", "two")
+    assert "--starts: many is no number" in run(*in_scene, "--guess", video, "--starts", "many")
     assert not (here / "x").exists()
 
     # A folder of another video or of other options is no place for this one.
-    (here / "y").mkdir()
+    (here / "y/found").mkdir(parents=True)
     (here / "y/made_of.txt").write_text("another video\n")
     said = run(tools / "from_video", video, "--out", here / "y")
     assert "was made of another video or with other options" in said and "name a new folder" in said, said
     (here / "y/made_of.txt").unlink()
-    (here / "y/found").mkdir()
     assert "no made_of.txt says of what" in run(tools / "from_video", video, "--out", here / "y")
+
+    # The order of the work, with a stand-in for hsi4d, on a folder in which the person is found already.
+    program = here / "program/hsi4d"
+    program.parent.mkdir()
+    program.write_text(STAND_IN)
+    program.chmod(0o755)
+    calls = program.parent / "calls.txt"
+    word = program.parent / "word"
+    environment = dict(os.environ, HSI4D=str(program))
+    guess = here / "guess.json"
+    guess.write_text("{}")
+    words = [str(video), "--scene", str(video), "--guess", str(guess), "--look", "kept", "--frame-rate", "5"]
+    all_of_it = [tools / "from_video", *words, "--out", here / "z"]
+    made_of = "".join(f"{text}\n" + (f"{hashlib.sha256(pathlib.Path(text).read_bytes()).hexdigest()}  {text}\n" if pathlib.Path(text).exists() else "")
+                      for text in words)
+    (here / "z/found/masks").mkdir(parents=True)
+    (here / "z/made_of.txt").write_text(made_of)
+
+    # The video is looked at first, in the words of the options.
+    (program.parent / "refused").write_text("hsi4d: error: gives 1 of its 1 frames\n")
+    assert "gives 1 of its 1 frames" in run(*all_of_it, env=environment)
+    assert calls.read_text() == f"info {video} --frame-rate 5\n", calls.read_text()
+    (program.parent / "refused").unlink()
+
+    # A camera of which the program says fail ends the work, each time; one option goes on.
+    word.write_text("fail")
+    for _ in range(2):
+        said = run(*all_of_it, env=environment)
+        assert "the camera is not found: hsi4d locate says fail" in said and "--any-camera" in said, said
+    assert [line.split()[0] for line in calls.read_text().splitlines()] == ["info", "info", "locate", "info"]
+    assert not (here / "z/clip").exists()
+    result = subprocess.run([str(text) for text in [*all_of_it, "--any-camera"]], capture_output=True, text=True, env=environment)
+    assert result.returncode == 0, result.stdout + result.stderr
+    done = calls.read_text().splitlines()[4:]
+    assert [line.split()[0] for line in done] == ["info", "init", "run"], done
+    assert f"--camera {here}/z/camera.json --scene {video}" in done[1] and "--frame-rate 5" in done[1], done
+    # A good one needs no option.
+    word.write_text("pass")
+    for file in ["camera.json", "camera.txt"]:
+        (here / "z" / file).unlink()
+    result = subprocess.run([str(text) for text in all_of_it], capture_output=True, text=True, env=environment)
+    assert result.returncode == 0 and "9.1 dB (pass)" in result.stdout, result.stdout + result.stderr
+    assert "== the camera in the scene" in result.stderr and "== the motion" in result.stderr, result.stderr
 print("passed")

@@ -40,6 +40,8 @@ with tempfile.TemporaryDirectory() as name:
     assert masks == ["0000.png", "0001.png", "0002.png"], masks
     landmarks = json.loads((here / "found/keypoints.json").read_text())["landmarks"]
     assert len(landmarks) == 3 and len(landmarks[0]) == 33
+    assert len(found["scores"]) == 3 and all(0.5 < score <= 1 for score in found["scores"]), found["scores"]
+    assert f"frontend: the score is {min(found['scores']):g} to {max(found['scores']):g}, below 0.5 in 0 of 3 frames" in said, said
 
     # The program reads them, and the term that does ends near them: the points are the person's.
     stages = json.loads((clip / "config.json").read_text())["stages"]
@@ -57,6 +59,19 @@ with tempfile.TemporaryDirectory() as name:
     last = [line for line in lines if line["stage"] == "interaction"][-1]["losses"]["keypoints_2d"]
     print(f"keypoints_2d at the end: {last:.1f} px^2")
     assert last < 8**2, last
+
+    # The same inside of a run: nothing but the video, the scene and frame 0 are given.
+    (here / "own.json").write_text(json.dumps({
+        "extends": str(clip / "config.json"), "remove_depth_bias": False,
+        "data": {"masks": ""}, "sources": {"motion": {"program": "embedded"}, "masks": {"program": "embedded"}},
+        "stages": {"refinement": None, "camera": {"iterations": 1}, "interaction": {"iterations": 1}},
+    }))
+    environment = dict(os.environ, HSI4D_FRONTEND=str(packages))
+    run(program, "run", here / "own.json", "--out", here / "own", env=environment)
+    made = sorted(path.name.split("-")[0] for path in (here / "generated").iterdir())
+    assert made == ["masks", "masks", "motion", "motion", "person", "person"], made
+    person = next(path for path in (here / "generated").iterdir() if path.name.startswith("person-") and path.is_dir())
+    assert json.loads((person / "keypoints.json").read_text())["frames"] == found["frames"]
 
     # Hands: the one that is raised is found, at BlazePose's wrist and with its fingers in their order.
     if (packages / "node_modules/@mediapipe/hands/hands.js").exists():
@@ -94,14 +109,21 @@ with tempfile.TemporaryDirectory() as name:
         _, said, chosen = look(f"side_{side}", ["-c", "copy"], here / "two.mp4", ["--person", box])
         assert all((x > 0.5) == side for x in hips(chosen)), (side, hips(chosen), said)
     refused = [*frontend, here / "two.mp4", "--out", here / "x", "--person"]
-    assert "nobody is found in that box of 0000.png" in run(*refused, "0,0,40,40", status=1)
-    assert "X0 < X1 up to 1024, Y0 < Y1 up to 512" in run(*refused, "0,0,1025,512", status=1)
+    assert "nobody is found in that box of 0000.png" in run(*refused, "0,0,40,40", status=2)
+    assert "X0 < X1 up to 1024, Y0 < Y1 up to 512" in run(*refused, "0,0,1025,512", status=2)
     upright, said, portrait = look("portrait", ["-vf", "crop=300:512"])
     assert portrait["size"] == [300, 512] and all(portrait["frames"]), said
     lying, _, _ = look("lying", ["-vf", "transpose=clock"], upright)
     _, said, turned = look("turned", ["-c", "copy", "-metadata:s:v", "rotate=90"], lying)
     assert turned["size"] == [300, 512], said
     assert all(abs(a - b) < 0.05 for a, b in zip(hips(turned), hips(portrait))), (hips(turned), hips(portrait))
+
+    # Smoothed points are near those that were found, and rest more.
+    _, said, rough = look("rough", ["-c", "copy"])
+    _, said, smooth = look("smooth", ["-c", "copy"], options=["--smooth", "3"])
+    assert smooth["scores"] == rough["scores"], said
+    moved = [math.dist(a[:2], b[:2]) for t in range(3) for a, b in zip(smooth["frames"][t], rough["frames"][t])]
+    assert 0 < max(moved) < 20, max(moved)
 
     # Somebody else from one frame to the next is told.
     (here / "cut").mkdir()
@@ -112,6 +134,11 @@ with tempfile.TemporaryDirectory() as name:
     assert "the person is suddenly elsewhere in frames " in said, said
 
     environment = dict(os.environ, HSI4D=str(program))
+    one = here / "one.mp4"
+    run("ffmpeg", "-v", "error", "-i", clip / "video.mp4", "-frames:v", "1", one)
+    said = run(tools / "from_video", one, "--out", here / "x", "--packages", packages, status=2, env=environment)
+    assert "holds one picture and no video" in said and "frame 1 of" not in said, said
+    assert "the video has 1 frames; allowed: two or more" in run(*frontend, one, "--out", here / "x", status=2)
     all_of_it = [tools / "from_video", clip / "video.mp4", "--out", here / "all", "--packages", packages, "--longest-side-px", 256]
     assert "quality: " in run(*all_of_it, env=environment)
     assert (here / "all/run/report.html").exists() and (here / "all/clip/plate.png").exists()
@@ -124,15 +151,15 @@ with tempfile.TemporaryDirectory() as name:
     assert "quality: " in run(*in_scene, env=environment)
     assert (here / "in_scene/camera.png").exists() and not (here / "in_scene/clip/plate.png").exists()
 
-    assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x", status=1)
+    assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x", status=2)
 
-    assert "is there already" in run(*frontend, clip / "video.mp4", "--out", here / "found", status=1)
-    assert "there is no such file" in run(*frontend, here / "none.mp4", "--out", here / "x", status=1)
-    assert "allowed: lite, full, heavy" in run(*frontend, clip / "video.mp4", "--out", here / "x", "--model", "best", status=1)
+    assert "is there already" in run(*frontend, clip / "video.mp4", "--out", here / "found", status=2)
+    assert "there is no such file" in run(*frontend, here / "none.mp4", "--out", here / "x", status=2)
+    assert "allowed: lite, full, heavy" in run(*frontend, clip / "video.mp4", "--out", here / "x", "--model", "best", status=2)
     (here / "text.mp4").write_text("no video")
-    assert "is no video" in run(*frontend, here / "text.mp4", "--out", here / "x", status=1)
+    assert "is no video" in run(*frontend, here / "text.mp4", "--out", here / "x", status=2)
     (here / "black").mkdir()
     run("ffmpeg", "-v", "error", "-f", "lavfi", "-i", "color=black:size=64x64:rate=1:duration=2", here / "black/%04d.png")
-    assert "nobody is found in any frame" in run(*frontend, here / "black", "--out", here / "x", status=1)
+    assert "nobody is found in any frame" in run(*frontend, here / "black", "--out", here / "x", status=2)
     assert not (here / "x").exists()
 print("passed")

@@ -1,28 +1,34 @@
 // Finds a person in pictures by BlazePose in headless Chromium: what tools/frontend runs.
 //
-//     node tools/services/blazepose.mjs NODE_MODULES FRAMES MODEL OUT [X0,Y0,X1,Y1 [hands]]
+//     node tools/services/blazepose.mjs --packages NODE_MODULES --frames DIR --model M --out DIR
+//         [--person X0,Y0,X1,Y1] [--hands] [--smooth N] [--numbered]
 //
-// The box, pixels of the first picture, says which person is followed.
+// The box, pixels of the first picture, says which person is followed. --numbered: masks are called by the numbers of
+// the pictures, 0000.png, ..., not as these.
 // The packages are served to the page by a server of this process on the loopback interface. Chromium draws by its
-// processor. Exits with 1 and a message where the pictures are unusable or show nobody.
+// processor. Exits with 2 and a message where the pictures are unusable or show nobody, with 1 where the browser fails.
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
 import { createReadStream, existsSync, mkdirSync, readdirSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { createRequire } from 'node:module';
 import { basename, join } from 'node:path';
-import { HandFinder, meanOf } from './hands.mjs';
+import { parseArgs } from 'node:util';
+import { HandFinder } from './hands.mjs';
+import { byBytes, jumpsOf, kDoubtful, scoresOf, smoothed } from './track.mjs';
 
-const [modules, frames, model, out, person, hands] = process.argv.slice(2);
+const text = { type: 'string' }, flag = { type: 'boolean' };
+const { packages: modules, frames, model, out, person, hands, smooth, numbered } = parseArgs({
+  options: { packages: text, frames: text, model: text, out: text, person: text, hands: flag, smooth: text, numbered: flag },
+}).values;
 const kComplexity = { lite: 0, full: 1, heavy: 2 };
-const kLimbs = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]; // shoulders to wrists, hips to ankles
-const kDoubtful = 0.5; // mean visibility of the limbs below which a frame is told
-const kJump = 0.5; // of the person's height in the picture: by more the middle of shoulders and hips moves from another
 
-function fail(message) {
+function fail(message, status = 1) {
   console.error(`frontend: ${message}`);
-  process.exit(1);
+  process.exit(status);
 }
+
+const refuse = (message) => fail(message, 2);
 
 const kPackages = ['pose', 'hands']; // of MediaPipe, each with a page
 const kTypes = { html: 'text/html', js: 'text/javascript', wasm: 'application/wasm', png: 'image/png' };
@@ -102,7 +108,7 @@ class MaskWriter {
   constructor(names) {
     this.folder = join(out, 'masks', 'human');
     mkdirSync(this.folder, { recursive: true });
-    this.names = names;
+    this.names = names; // of the masks
   }
   async write(index, width, height, bytes) {
     const file = join(this.folder, this.names[index]);
@@ -114,34 +120,16 @@ class MaskWriter {
   }
 }
 
-// Middle of shoulders and hips, and the height of what is found; pixels.
-function whereabouts(points) {
-  const trunk = [11, 12, 23, 24].map((i) => points[i]), ys = points.map(([, y]) => y);
-  return { x: meanOf(trunk.map(([x]) => x)), y: meanOf(trunk.map(([, y]) => y)), height: Math.max(...ys) - Math.min(...ys) };
-}
-
-// Frames in which somebody is found elsewhere than in the last one before in which somebody was.
-function jumps(frames) {
-  const found = [];
-  let last;
-  for (const [t, points] of frames.entries()) {
-    if (points.length === 0) continue;
-    const now = whereabouts(points);
-    if (last !== undefined && Math.hypot(now.x - last.x, now.y - last.y) > kJump * last.height) found.push(t);
-    last = now;
-  }
-  return found;
-}
-
-async function beginWith(page, name) {
+async function beginWith(page, name, title) {
   const box = person.split(',').map(Number), [left, top, right, bottom] = box;
-  const seen = await page.evaluate(lookIntoBox, { name, box }).catch((error) => fail(`${name}: ${error.message}`));
+  const seen = await page.evaluate(lookIntoBox, { name, box }).catch((error) => fail(`${title}: ${error.message}`));
   if (!(left < right && top < bottom && right <= seen.width && bottom <= seen.height))
-    fail(`--person ${person}: is no box in ${name}; allowed: X0 < X1 up to ${seen.width}, Y0 < Y1 up to ${seen.height}`);
-  if (!seen.isFound) fail(`--person ${person}: nobody is found in that box of ${name}`);
+    refuse(`--person ${person}: is no box in ${title}; allowed: X0 < X1 up to ${seen.width}, Y0 < Y1 up to ${seen.height}`);
+  if (!seen.isFound) refuse(`--person ${person}: nobody is found in that box of ${title}`);
 }
 
 const rounded = (number) => Math.round(number * 1000) / 1000;
+const allRounded = (frames) => frames.map((rows) => rows.map((row) => row.map(rounded)));
 
 function ranges(numbers) {
   const parts = [];
@@ -153,9 +141,25 @@ function ranges(numbers) {
   return parts.map(([a, b]) => (a === b ? `${a}` : `${a}-${b}`)).join(', ');
 }
 
-const names = readdirSync(frames).filter((name) => name.endsWith('.png') && !name.startsWith('.'))
-  .sort((a, b) => a.length - b.length || (a < b ? -1 : 1)); // beyond 9999 numbers have a digit more
-if (names.length === 0) fail(`${frames}: holds no .png frames`);
+// What the frames are worth is told, and returned as numbers.
+function told(points) {
+  const all = scoresOf(points), jumps = jumpsOf(points);
+  const framesOf = (isOne) => points.flatMap((found, t) => (found.length > 0 && isOne(all[t], t) ? [t] : []));
+  const tell = (numbers, before, after = '') => {
+    if (numbers.length > 0) console.error(`frontend: ${before} in frames ${ranges(numbers)}${after}`);
+  };
+  tell(points.flatMap((found, t) => (found.length === 0 ? [t] : [])), 'nobody is found', '; their masks are black');
+  tell(framesOf(({ isSeen }) => !isSeen), 'less than half of the person is seen');
+  tell(framesOf(({ isSteady }, t) => !isSteady && !jumps.includes(t)), 'the points leap');
+  tell(jumps, 'the person is suddenly elsewhere', ': somebody else, or a cut?');
+  const scores = all.map(({ score }) => rounded(score)), low = scores.filter((score) => score < kDoubtful).length;
+  console.error(`frontend: the score is ${Math.min(...scores)} to ${Math.max(...scores)}, below ${kDoubtful} in ${low} of ${scores.length} frames`);
+  return scores;
+}
+
+const names = readdirSync(frames).filter((name) => name.endsWith('.png') && !name.startsWith('.')).sort(byBytes);
+if (names.length < 2) refuse(`${numbered ? 'the video' : frames} has ${names.length} ${numbered ? '' : '.png '}frames; allowed: two or more`);
+const titles = numbered ? names.map((_, index) => `${index}`.padStart(4, '0') + '.png') : names; // of masks, and in messages
 const { chromium } = createRequire(import.meta.url)(join(modules, 'playwright-core'));
 const { server, url } = await served();
 const browser = await chromium.launch({
@@ -173,38 +177,36 @@ try {
   await page.evaluate(begin, kComplexity[model]).catch((error) => fail(`BlazePose does not begin: ${error.message}`));
   const finder = hands ? new HandFinder(await opened('hands', 'MediaPipe Hands')) : undefined;
   await finder?.begin().catch((error) => fail(`MediaPipe Hands does not begin: ${error.message}`));
-  if (person) await beginWith(page, names[0]);
-  const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [], handed = [0, 0];
+  if (person) await beginWith(page, names[0], titles[0]);
+  const masks = new MaskWriter(titles), points = [], places = [], handed = [0, 0];
   let size, began = Date.now();
   for (const [index, name] of names.entries()) {
-    const found = await page.evaluate(look, name).catch((error) => fail(`${name}: ${error.message}`));
+    const found = await page.evaluate(look, name).catch((error) => fail(`${titles[index]}: ${error.message}`));
     size ??= [found.width, found.height];
     if (found.width !== size[0] || found.height !== size[1])
-      fail(`${name}: is ${found.width}x${found.height} pixels, the first frame ${size.join('x')}`);
+      refuse(`${titles[index]}: is ${found.width}x${found.height} pixels, the first frame ${size.join('x')}`);
     await masks.write(index, found.width, found.height, Buffer.from(found.mask, 'base64'));
     const seen = (found.points ?? []).map(({ x, y, visibility }) => [x * size[0], y * size[1], Math.min(Math.max(visibility, 0), 1)]);
     const spots = (found.places ?? []).map(({ x, y, z }) => [x, y, z]);
-    const both = finder && found.points ? await finder.find(name, seen, spots).catch((error) => fail(`${name}: ${error.message}`)) : [];
+    const both = finder && found.points ? await finder.find(name, seen, spots).catch((error) => fail(`${titles[index]}: ${error.message}`)) : [];
     for (const [side, hand] of both.entries()) {
       seen.push(...hand.points);
       spots.push(...hand.places);
       if (hand.points[0][2] > 0) handed[side] += 1;
     }
-    points.push(seen.map((point) => point.map(rounded)));
-    places.push(spots.map((place) => place.map(rounded)));
-    if (!found.points) empty.push(index);
-    else if (meanOf(kLimbs.map((i) => found.points[i].visibility)) < kDoubtful) doubtful.push(index);
+    points.push(seen);
+    places.push(spots);
     process.stderr.write(`\rframe ${index + 1} of ${names.length}, ${((Date.now() - began) / 1000 / (index + 1)).toFixed(1)} s each `);
   }
   process.stderr.write('\n');
-  if (empty.length === names.length) fail('nobody is found in any frame');
-  if (empty.length > 0) console.error(`frontend: nobody is found in frames ${ranges(empty)}; their masks are black`);
-  if (doubtful.length > 0) console.error(`frontend: less than half of the limbs is seen in frames ${ranges(doubtful)}`);
+  if (points.every((found) => found.length === 0)) refuse('nobody is found in any frame');
+  const scores = told(points);
   if (finder) console.error(`frontend: the left hand is found in ${handed[0]} frames, the right one in ${handed[1]}, of ${names.length}`);
-  const jumping = jumps(points);
-  if (jumping.length > 0)
-    console.error(`frontend: the person is suddenly elsewhere in frames ${ranges(jumping)}: somebody else, or a cut?`);
-  const file = { format: 'hsi4d keypoints', version: 1, joints: finder ? 'blazepose33_hands' : 'blazepose33', size, frames: points, landmarks: places };
+  const track = smooth ? smoothed(points, places, Number(smooth)) : { points, places };
+  const file = {
+    format: 'hsi4d keypoints', version: 1, joints: finder ? 'blazepose33_hands' : 'blazepose33', size,
+    frames: allRounded(track.points), landmarks: allRounded(track.places), scores,
+  };
   writeFileSync(join(out, 'keypoints.json'), `${JSON.stringify(file)}\n`);
 } finally {
   await browser.close();

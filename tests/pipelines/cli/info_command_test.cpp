@@ -139,8 +139,32 @@ TEST_CASE("info tells what other JSON is, and that a folder is none of its files
   CHECK(cli::info_command("summary.json") == "summary.json: JSON with name frames\n");
   CHECK_THROWS(cli::info_command("wrong.json"));
   CHECK_THROWS_WITH(cli::info_command("."),
-                    "hsi4d info: . is a folder; allowed: a file (`hsi4d report` and `hsi4d "
-                    "evaluate` tell of the folder of a run)");
+                    "hsi4d info: . is a folder without .png frames; allowed: a file, or a folder of frames (`hsi4d "
+                    "report` and `hsi4d evaluate` tell of the folder of a run)");
+}
+
+TEST_CASE("info tells what a clip reads of frames, in the words of its options") {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory("frames");
+  for (int t = 0; t < 6; ++t) write_image("frames/" + std::to_string(t) + ".png", Image(3, 20, 40));
+  CHECK(cli::video_info("frames", {}, {}) == "frames: 6 frames of 40 x 20 pixels, no rate is known\n");
+  CHECK(cli::video_info("frames", 10, 5) ==
+        "frames: 6 frames of 40 x 20 pixels, 10 a second; a clip of 5 a second has 3 frames\n");
+  CHECK_THROWS_WITH(cli::video_info("frames", {}, 5),
+                    "frames: does not say how many frames a second it has, so that 5 of them cannot be kept; "
+                    "--video-rate says it");
+  CHECK_THROWS_WITH(cli::video_info("frames", 10, 20),
+                    "frames: has 10 frames a second; --frame-rate, 20, cannot be more");
+  CHECK_THROWS_WITH(cli::video_info("frames", 10, 1), "frames: gives 1 of its 6 frames; a clip needs at least 2");
+  CHECK_THROWS_WITH(cli::video_info("frames", -1, {}),
+                    Catch::Matchers::Contains("hsi4d info: --video-rate: -1 is out of "
+                                              "range"));
+  CHECK(run_hsi4d({"info", "frames", "--video-rate", "10", "--frame-rate", "5"}).out ==
+        cli::video_info("frames", 10, 5));
+  write_text_file("a.txt", "");
+  const ProgramResult other = run_hsi4d({"info", "a.txt", "--frame-rate", "5"});
+  CHECK(other.status == 2);
+  CHECK(other.err == "hsi4d info: --video-rate and --frame-rate are of a video or a folder of frames\n");
 }
 
 TEST_CASE("info names what is allowed and seldom meant") {

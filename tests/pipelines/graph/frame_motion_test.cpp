@@ -188,7 +188,8 @@ TEST_CASE("keypoints are where the camera sees the joints, with the gradients of
                               {{joint("left_hip"), 0.5}, {joint("right_hip"), 0.5}},
                               {{joint("head"), 1.0}},
                               {{joint("right_ankle"), 1.0}}},
-                             {{}, {{0.3, 0.4, 1}, {0.5, 0.5, 0.5}, {0.9, 0.1, 0.8}, {1.4, -0.2, 0.1}}}};
+                             {{}, {{0.3, 0.4, 1}, {0.5, 0.5, 0.5}, {0.9, 0.1, 0.8}, {1.4, -0.2, 0.1}}},
+                             {}};
   FrameGraphSettings settings = settings_with_human();
   settings.keypoints = true;
   Tape<double> tape;

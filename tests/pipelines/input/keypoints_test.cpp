@@ -92,6 +92,30 @@ TEST_CASE("keypoints of the project's own format are shares of the image, and th
   CHECK(Workshop::read("k.json").frames[0][0].x == 0.125);
 }
 
+TEST_CASE("frames of which the detector is unsure are told by their numbers", "[scores]") {
+  const Workshop workshop;
+  const Json joints = {"pelvis"};
+  Json content = own(joints, {{{1, 2, 0.9}}, {{3, 4, 0.9}}, Json::array()});
+  write("plain.json", content);
+  CHECK(Workshop::read("plain.json").scores.empty());
+  content["scores"] = {0.25, 0.5, 0};
+  write("scored.json", content);
+  std::string warning;
+  const LogSink sink =
+      log_to([&warning](LogLevel, std::string_view message) { warning += std::string(message) + "\n"; });
+  CHECK(Workshop::read("scored.json").scores == std::vector<double>{0.25, 0.5, 0});
+  CHECK_THAT(warning, Contains("scored.json: the person is found doubtfully in 1 of 3 frames (0), scores below 0.5\n"));
+  const auto fault = [&](const Json& scores) {
+    content["scores"] = scores;
+    write("wrong.json", content);
+    return Workshop::fault("wrong.json");
+  };
+  CHECK_THAT(fault({1, 1}), Contains("/scores: has 2 numbers; /frames has 3"));
+  CHECK_THAT(fault({1, 1.5, 1}), Contains("/scores/1: 1.5 is out of range; allowed: 0 to 1"));
+  CHECK_THAT(fault({1, "one", 1}), Contains("/scores/1"));
+  CHECK_THAT(fault(0.5), Contains("/scores"));
+}
+
 TEST_CASE("landmarks are in the same file, a place a point or none a frame") {
   const Workshop workshop;
   Json content = own({"pelvis", nullptr, "head"}, {{{1, 1, 1}, {2, 2, 1}, {3, 3, 1}}, Json::array(), Json::array()});

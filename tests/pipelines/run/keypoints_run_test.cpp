@@ -4,14 +4,13 @@
 
 #include <catch2/catch.hpp>
 
-#include "body/kinematics.h"
-#include "body/motion_io.h"
 #include "core/rotation.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/metrics/keypoint_errors.h"
 #include "pipelines/run/heading_starts.h"
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
+#include "tests/support/true_keypoints.h"
 
 namespace keypoints_run_test {
 
@@ -22,34 +21,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr Index kPoints = 22;  // the first joints of SMPL-X
-
-/// Where a camera sees the first joints of a body, (x, y) each, pixels.
-std::vector<double> seen_joints(const Clip& clip, const Rigid<double>& camera_from_world, const BodyPose& pose) {
-  const std::vector<double> joints = pose_joints(clip.avatar.parents, clip.avatar.joints, pose);
-  std::vector<double> places;
-  for (Index j = 0; j < kPoints; ++j) {
-    const Vector3<double> p =
-        camera_from_world.rotation * Vector3<double>(joints.data() + 3 * j) + camera_from_world.translation;
-    places.push_back(clip.camera.fx * p[0] / p[2] + clip.camera.cx);
-    places.push_back(clip.camera.fy * p[1] / p[2] + clip.camera.cy);
-  }
-  return places;
-}
-
-/// What a perfect detector would find, of all frames.
-nlohmann::json true_keypoints(const Clip& clip) {
-  nlohmann::json joints = nlohmann::json::array(), frames = nlohmann::json::array();
-  for (Index j = 0; j < kPoints; ++j) joints.push_back(smplx_joint_names()[static_cast<std::size_t>(j)]);
-  for (const SceneState& state : *clip.truth) {
-    const std::vector<double> places = seen_joints(clip, state.camera_from_world, state.body);
-    nlohmann::json frame = nlohmann::json::array();
-    for (std::size_t j = 0; j < kPoints; ++j) frame.push_back({places[2 * j], places[2 * j + 1], 1});
-    frames.push_back(frame);
-  }
-  return {{"format", "hsi4d keypoints"}, {"version", 1}, {"joints", joints}, {"frames", frames}};
-}
-
 /// Mean distance of a motion's joints from the truth's, frame 0 left out, pixels.
 double error_px(const Clip& clip, const std::vector<BodyPose>& poses) {
   double sum = 0;
@@ -57,9 +28,9 @@ double error_px(const Clip& clip, const std::vector<BodyPose>& poses) {
     const SceneState& truth = (*clip.truth)[t];
     const std::vector<double> a = seen_joints(clip, truth.camera_from_world, poses[t]),
                               b = seen_joints(clip, truth.camera_from_world, truth.body);
-    for (std::size_t j = 0; j < kPoints; ++j) sum += std::hypot(a[2 * j] - b[2 * j], a[2 * j + 1] - b[2 * j + 1]);
+    for (std::size_t j = 0; j < kTruePoints; ++j) sum += std::hypot(a[2 * j] - b[2 * j], a[2 * j + 1] - b[2 * j + 1]);
   }
-  return sum / static_cast<double>(kPoints * (poses.size() - 1));
+  return sum / static_cast<double>(kTruePoints * (poses.size() - 1));
 }
 
 /// Angle between two bodies' root rotations.

@@ -101,7 +101,7 @@ TEST_CASE("keypoints are straightened as the frames are") {
     return Vector2<double>((camera.fx * at[0] + camera.cx) / camera.width,
                            (camera.fy * at[1] + camera.cy) / camera.height);
   };
-  clip.keypoints = Keypoints{{{{0, 1.0}}}, {{{share(bent)[0], share(bent)[1], 0.9}}}};
+  clip.keypoints = Keypoints{{{{0, 1.0}}}, {{{share(bent)[0], share(bent)[1], 0.9}}}, {}};
   set_lens(lens, clip);
   CHECK(clip.keypoints->frames[0][0].x == Approx(share(direction)[0]).epsilon(1e-9));
   CHECK(clip.keypoints->frames[0][0].y == Approx(share(direction)[1]).epsilon(1e-9));

@@ -15,6 +15,7 @@
 #include "tests/support/program.h"
 #include "tests/support/running_program.h"
 #include "tests/support/tiny_run.h"
+#include "tests/support/true_keypoints.h"
 
 namespace sources_test {
 
@@ -315,6 +316,141 @@ TEST_CASE("hsi4d makes the masks of objects itself where it is told to, once", "
     const Image mask = read_image((entry.path() / "human" / "0003.png").string()),
                 human = read_image((given / "human" / "0003.png").string());
     CHECK(mask_iou(mask, human).value() > 0.5);
+  }
+}
+
+namespace {
+
+/// A program "find" that stands for the front end: the truth's keypoints and the human's masks.
+void script_find() {
+  std::ofstream("true_keypoints.json") << true_keypoints(read_clip(tiny_config().data)).dump();
+  Workshop::script("find",
+                   "echo \"$*\" >> find.txt; mkdir -p \"$3/masks\"; cp true_keypoints.json "
+                   "\"$3/keypoints.json\"; cp -r " +
+                       TinyDataset::folder().string() + "/masks/human \"$3/masks/\"");
+}
+
+/// Mean distance of the joints of later frames from the truth's, metres, once both stand in one place.
+double pose_error(const Clip& clip, const Motion& motion) {
+  double sum = 0;
+  for (std::size_t t = 1; t < clip.truth->size(); ++t) {
+    const auto joints = [&clip](const BodyPose& pose) {
+      return pose_joints(clip.avatar.parents, clip.avatar.joints, pose);
+    };
+    const std::vector<double> a = joints(motion.poses[t]), b = joints((*clip.truth)[t].body);
+    for (std::size_t j = 0; j < kTruePoints; ++j) {
+      Vector3<double> difference;
+      for (std::size_t c = 0; c < 3; ++c)
+        difference[static_cast<Index>(c)] = (a[3 * j + c] - a[c]) - (b[3 * j + c] - b[c]);
+      sum += difference.norm();
+    }
+  }
+  return sum / static_cast<double>(kTruePoints * (clip.truth->size() - 1));
+}
+
+}  // namespace
+
+TEST_CASE("hsi4d finds poses itself from keypoints, and the person by the front end, once", "[run]") {
+  Workshop workshop;
+  script_find();
+  workshop.config["data"] = {{"masks", ""}, {"objects", {{kTinyObject, nullptr}}}};
+  workshop.config["stages"]["interaction"]["losses"] = {{"center", nullptr}, {"depth", nullptr}};
+  workshop.config["stages"]["interaction"]["optimize"] = {{"object_orient", nullptr}, {"object_transl", nullptr}};
+  workshop.config["sources"] = {{"motion", {{"program", "embedded"}}}};
+  workshop.write();
+  // Without a command the front end beside the program is run, which must not install anything.
+  const ProgramResult dry = Workshop::run("dry", {"--dry-run"});
+  INFO(dry.err);
+  CHECK(dry.status == 0);
+  CHECK_THAT(dry.out, Contains("/tools/frontend, --no-install, {video}, --out, {out}\n    for ") &&
+                          Contains("  would then find the poses of the keypoints\n"));
+  workshop.config["sources"]["person"]["command"] = {"./find", "{video}", "--out", "{out}"};
+  workshop.write();
+  CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, Contains("  would run ./find, {video}, --out, {out}\n    for "));
+  CHECK(made().empty());
+
+  const ProgramResult first = Workshop::run("run");
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  CHECK(made() == Names{"motion-KEY.npz", "motion-KEY.npz.json", "person-KEY", "person-KEY.json"});
+  CHECK(lines_of("find.txt").size() == 1);
+  CHECK_THAT(file_text("run/log.txt"), Contains("person: runs ./find, ") && Contains("motion: is found of "));
+  CHECK(temporaries_in("generated").empty());
+
+  // The poses are those of the keypoints: nearer to the truth than that nothing moves.
+  const Clip clip = read_clip(tiny_config().data);
+  const Motion found = read_motion(made_file("motion", ".npz").string());
+  REQUIRE(found.poses.size() == clip.truth->size());
+  Motion still = found;
+  for (BodyPose& pose : still.poses) pose = clip.first.body;
+  INFO(pose_error(clip, found) << " m, still " << pose_error(clip, still) << " m");
+  CHECK(pose_error(clip, found) < 0.7 * pose_error(clip, still));
+
+  // What is there is used; another run has the same result, and keypoints count by their content.
+  CHECK(Workshop::run("run", {"--resume"}).status == 0);
+  CHECK(Workshop::run("other").status == 0);
+  CHECK(file_text("other/motion.npz") == file_text("run/motion.npz"));
+  CHECK(lines_of("find.txt").size() == 1);
+  workshop.config["data"]["keypoints"] = fs::absolute("true_keypoints.json").string();
+  workshop.config["data"]["masks"] = (TinyDataset::folder() / "masks").string();
+  workshop.config["sources"].erase("person");
+  workshop.write();
+  CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, !Contains("frontend") && !Contains("find the poses"));
+  nlohmann::json moved = json_of("true_keypoints.json");
+  for (auto& point : moved["frames"][2]) point[0] = point[0].get<double>() + 1;
+  std::ofstream("true_keypoints.json") << moved.dump();
+  CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, Contains("  would find the poses of the keypoints\n"));
+}
+
+TEST_CASE("what finds the person gives the human's masks to those who follow objects", "[run]") {
+  Workshop workshop;
+  script_find();
+  workshop.config["data"] = {{"masks", ""}};
+  workshop.config["sources"] = {{"masks", {{"program", "embedded"}}},
+                                {"person", {{"command", {"./find", "{video}", "--out", "{out}"}}}}};
+  workshop.write();
+  const ProgramResult result = Workshop::run("run");
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  CHECK(made() == Names{"masks-KEY", "masks-KEY.json", "person-KEY", "person-KEY.json"});
+  const fs::path masks = made_file("masks", ".json").replace_extension(), given = TinyDataset::folder() / "masks";
+  CHECK(read_image((masks / "human" / "0002.png").string()) == read_image((given / "human" / "0002.png").string()));
+  CHECK(fs::exists(masks / kTinyObject / "0003.png"));
+}
+
+TEST_CASE("a person who is not found, or found twice, is refused", "[run]") {
+  Workshop workshop;
+  script_find();
+  workshop.config["data"] = {{"masks", ""}};
+  workshop.config["sources"] = {{"masks", {{"program", "embedded"}}}, {"motion", {{"program", "embedded"}}}};
+  auto& person = workshop.config["sources"]["person"];
+  SECTION("wrong use ends the run with what the program says") {
+    Workshop::script("find", "echo 'frontend: nobody is found in any frame' >&2; exit 2");
+    person["command"] = {"./find", "{video}", "--out", "{out}"};
+    workshop.write();
+    CHECK_THAT(Workshop::refusal(),
+               Contains("/sources/person: ./find") && Contains("frontend: nobody is found in any frame"));
+  }
+  SECTION("keypoints of another length") {
+    nlohmann::json short_one = json_of("true_keypoints.json");
+    short_one["frames"].erase(3);
+    std::ofstream("true_keypoints.json") << short_one.dump();
+    person["command"] = {"./find", "{video}", "--out", "{out}"};
+    workshop.write();
+    CHECK_THAT(Workshop::refusal(), Contains("/sources/person: ./find wrote what cannot be used, kept as ") &&
+                                        Contains("keypoints.json: holds 3 frames of keypoints, the video has 4"));
+  }
+  SECTION("settings that say the same") {
+    person["command"] = {"./find", "{video}", "{prompt}"};
+    workshop.config["data"]["keypoints"] = "true_keypoints.json";
+    workshop.config["data"]["motion"] = (TinyDataset::folder() / "initial_motion.npz").string();
+    workshop.config["sources"]["motion"]["command"] = {"./find", "{out}"};
+    workshop.write();
+    const std::string message = Workshop::refusal();
+    CHECK_THAT(message, Contains("/data/keypoints: given, and /sources/person makes it too; remove one"));
+    CHECK_THAT(message, Contains("/data/motion: given, and /sources/motion makes it too; remove one"));
+    CHECK_THAT(message, Contains("/sources/motion/command: given, and /sources/motion/program is \"embedded\""));
+    CHECK_THAT(message, Contains("there is no placeholder {prompt}; known here: {video}, {out}"));
   }
 }
 
