@@ -4,6 +4,7 @@
 """
 
 import hashlib
+import json
 import os
 import pathlib
 import shutil
@@ -36,6 +37,14 @@ def path_with(folder, programs):
             (folder / name).write_text("#!/bin/sh\n")
             (folder / name).chmod(0o755)
     return dict(os.environ, PATH=str(folder), CHROMIUM="")
+
+
+def whole_with_all_programs(folder):
+    """The environment, with a Chromium that is there."""
+    folder.mkdir()
+    (folder / "chromium").write_text("#!/bin/sh\n")
+    (folder / "chromium").chmod(0o755)
+    return dict(os.environ, CHROMIUM=str(folder / "chromium"))
 
 
 def run_node(script):
@@ -115,6 +124,84 @@ const hidden = noisy.map((points, t) => points.map(([x, y]) => [x, y, t === 5 ? 
 near(smoothed(hidden, hidden, 7).points[5][0][0], hidden[5][0][0]); // what is not found stays where it is said to be
 """
 
+# playwright-core: a browser whose page answers for BlazePose what found.json has of each picture, in the order in which
+# they are looked at: [x of all points as a share of the width, visibility], or null. Notes the names in order.txt.
+BROWSER = """
+const fs = require('node:fs');
+const here = `${__dirname}/../../..`, found = () => JSON.parse(fs.readFileSync(`${here}/found.json`));
+let looked = 0;
+function look(name) {
+  fs.appendFileSync(`${here}/order.txt`, `${name}\\n`);
+  const one = found()[looked++], size = { width: 64, height: 48 }, mask = Buffer.alloc(64 * 48, one ? 255 : 0).toString('base64');
+  if (!one) return { ...size, mask };
+  const points = Array.from({ length: 33 }, (_, i) => ({ x: one[0], y: 0.1 + 0.8 * i / 32, z: 0, visibility: one[1] }));
+  return { ...size, mask, points, places: points };
+}
+const answers = { look, lookIntoBox: () => ({ isFound: found()[0] !== null, width: 64, height: 48 }), begin: () => undefined };
+const page = { on() {}, async goto() {}, async evaluate(work, argument) { return answers[work.name](argument); } };
+exports.chromium = { async launch() { return { async newPage() { return page; }, async close() {} }; } };
+"""
+
+
+def check_what_is_written(frontend, here, packages, env):
+    """All of the front end but the detector, for which a stand-in answers."""
+    browser = packages / "node_modules/playwright-core/index.js"
+    browser.write_text(BROWSER)
+    order = here / "order.txt"
+    ffmpeg = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=64x48:rate=10:duration=0.6"]
+    subprocess.run([*ffmpeg, here / "six.mp4"], check=True)
+    subprocess.run([*ffmpeg, "-start_number", "0", here / "%d.png"], check=True)
+    folder = here / "frames"
+    folder.mkdir()
+    names = ["10.png", "9.png", "Z.png", "a.png", "é.png", "\uffff.png"]  # in hsi4d's order; by length "9.png" were first
+    for number, name in enumerate(names):
+        (here / f"{number}.png").rename(folder / name)
+
+    def find(source, found, *options, status=0):
+        (here / "found.json").write_text(json.dumps(found))
+        order.write_text("")
+        out = here / "written"
+        shutil.rmtree(out, ignore_errors=True)
+        words = [*frontend, source, "--out", out, "--packages", packages, "--no-install", *options]
+        result = subprocess.run([str(word) for word in words], capture_output=True, text=True, env=env)
+        assert result.returncode == status, result.stdout + result.stderr
+        said = result.stdout + result.stderr
+        if status != 0:
+            assert not out.exists()
+            return said, None, None
+        masks = sorted((path.name for path in (out / "masks/human").iterdir()), key=lambda name: name.encode())
+        return said, json.loads((out / "keypoints.json").read_text()), masks
+
+    walk = [[0.3 + 0.01 * t, 0.9] for t in range(6)]
+    said, written, masks = find(here / "six.mp4", walk)
+    assert masks == [f"000{t}.png" for t in range(6)], masks
+    assert written["size"] == [64, 48] and written["frames"][2][0] == [20.48, 4.8, 0.9], written
+    assert written["scores"] == [0.9] * 6, written["scores"]
+    assert "frontend: the score is 0.9 to 0.9, below 0.5 in 0 of 6 frames" in said, said
+    _, _, masks = find(folder, walk)
+    assert order.read_text().splitlines() == names and masks == names, (order.read_text(), masks)
+
+    # Each reason has its words, and its frames.
+    said, written, _ = find(here / "six.mp4", [*walk[:2], None, [0.33, 0.2], [0.34, 0.9], [0.95, 0.9]])
+    assert "nobody is found in frames 2; their masks are black" in said, said
+    assert "less than half of the person is seen in frames 3" in said, said
+    assert "the person is suddenly elsewhere in frames 5" in said, said
+    assert written["frames"][2] == [] and written["scores"][2] == 0 and written["scores"][3] == 0, written["scores"]
+    said, _, _ = find(here / "six.mp4", [[0.3, 0.9], [0.3, 0.9], [0.54, 0.9], [0.3, 0.9], [0.3, 0.9], [0.3, 0.9]])
+    assert "the points leap in frames 2" in said and "elsewhere" not in said, said
+    assert "nobody is found in any frame" in find(here / "six.mp4", [None] * 6, status=wrong)[0]
+    assert "nobody is found in that box of 0000.png" in find(here / "six.mp4", [None] * 6, "--person", "0,0,9,9", status=wrong)[0]
+    assert "X0 < X1 up to 64, Y0 < Y1 up to 48" in find(here / "six.mp4", walk, "--person", "9,9,65,20", status=wrong)[0]
+
+    # Smoothed points; scores are of what was found.
+    shaken = [[0.3 + 0.02 * (t % 2), 0.9] for t in range(6)]
+    _, rough, _ = find(here / "six.mp4", shaken)
+    _, calm, _ = find(here / "six.mp4", shaken, "--smooth", "5")
+    across = [[frame[0][0] for frame in written["frames"]] for written in (rough, calm)]
+    assert max(across[1][1:5]) - min(across[1][1:5]) < 0.6 * (max(across[0]) - min(across[0])), across
+    assert calm["scores"] == rough["scores"] and calm["landmarks"] != rough["landmarks"]
+
+
 # hsi4d: notes how it was called, and says of the camera what the file `word` has.
 STAND_IN = """#!/bin/bash
 cd "$(dirname "$0")" || exit
@@ -178,6 +265,8 @@ with tempfile.TemporaryDirectory() as name:
         blazepose = ["node", tools / "services/blazepose.mjs", "--packages", here, "--model", "full", "--out", here / "x"]
         assert f"{here}/one has 1 .png frames; allowed: two or more" in run(*blazepose, "--frames", here / "one")
         assert "the video has 1 frames" in run(*blazepose, "--frames", here / "one", "--numbered")
+        if shutil.which("ffmpeg"):
+            check_what_is_written([tools / "frontend"], here, here / "packages", whole_with_all_programs(here / "f"))
 
     assert "allowed: lite, full, heavy" in run(*frontend, "--model", "best")
     assert "allowed: X0,Y0,X1,Y1, whole pixels of the first frame" in run(*frontend, "--person", "1,2,3")
