@@ -9,8 +9,13 @@
 namespace hsi4d {
 
 template <class S>
-Curvature<S>::Curvature(Tape<S>& tape, Var<S> loss, std::vector<Var<S>> leaves)
-    : tape_(tape), loss_(loss), leaves_(std::move(leaves)), seen_(leaves_.size(), 0), weights_(tape), movers_(tape) {
+Curvature<S>::Curvature(Tape<S>& tape, Var<S> loss, std::vector<Var<S>> leaves, const CurvatureRule& rule)
+    : tape_(tape),
+      loss_(loss),
+      leaves_(std::move(leaves)),
+      seen_(leaves_.size(), 0),
+      weights_(tape, rule),
+      movers_(tape) {
   Index count = 0;
   for (const Var<S> leaf : leaves_) count += tape.shape(leaf).count();
   matrix_.setZero(count, count);
@@ -39,6 +44,7 @@ const Eigen::MatrixXd& Curvature<S>::compute() {
     for (const std::uint32_t array : residuals_) add_residuals(array);
   });
   timed(times_.movers, [&] { add_movers(); });
+  ++weights_.rule.turn;
   return matrix_;
 }
 

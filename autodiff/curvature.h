@@ -56,7 +56,8 @@ class Curvature {
 
   /// @param loss    a scalar on the tape
   /// @param leaves  their numbers are the rows and columns of H, in order, row-major without padding
-  Curvature(Tape<S>& tape, Var<S> loss, std::vector<Var<S>> leaves);
+  /// @param rule    its turn goes on by one with every matrix
+  Curvature(Tape<S>& tape, Var<S> loss, std::vector<Var<S>> leaves, const CurvatureRule& rule = {});
   Curvature(const Curvature&) = delete;
   Curvature& operator=(const Curvature&) = delete;
 

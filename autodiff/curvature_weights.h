@@ -10,11 +10,21 @@
 
 namespace hsi4d {
 
+/// What a curvature leaves out, and where it rounds.
+struct CurvatureRule {
+  double least_difference = 0.01;  ///< absolute differences below it count as squares: grey levels, and some
+  Index tiles = 1;                 ///< of so many tiles of a render one counts, so many times
+  Index turn = 0;                  ///< which of them
+  bool structural = true;          ///< SSIM has a part
+};
+
 /// w of arrays of one tape. What an operator's `weigh` reads and adds to.
 template <class S>
 class CurvatureWeights {
  public:
-  explicit CurvatureWeights(Tape<S>& tape) : tape_(tape) {}
+  explicit CurvatureWeights(Tape<S>& tape, const CurvatureRule& given = {}) : rule(given), tape_(tape) {}
+
+  CurvatureRule rule;
 
   /// w of input i, shaped like it, to be added to; zeros when first asked for.
   Array<S> of_input(const NodeIo<S>& io, int i) { return made(io.input_ids_[i]); }

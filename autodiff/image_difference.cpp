@@ -147,6 +147,7 @@ struct ImageDifference {
     const S g = io.d_out().scalar();
     if (!io.wants(kA) || !(g > S(0))) return true;
     const ConstArray<S> a = io.in(kA), b = io.in(kB);
+    const S least = static_cast<S>(weights.rule.least_difference);
     const Array<S> to = weights.of_input(io, kA);
     run_chunks(mask_squares(a.shape.rows), [&](Index square_row) {
       const Index last_row = std::min((square_row + 1) * kMaskSquare, a.shape.rows);
@@ -156,7 +157,7 @@ struct ImageDifference {
             const S* const w = weights_at(io, plane, r);
             for (Index c = run.begin; c < run.end; ++c) {
               const S d = a(plane, r, c) - b(plane, r, c), each = w == nullptr ? S(1) : w[c];
-              if (counts(each, F::value(d))) to(plane, r, c) += g * each * F::curvature(d);
+              if (counts(each, F::value(d))) to(plane, r, c) += g * each * F::curvature(d, least);
             }
           }
         }

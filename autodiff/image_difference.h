@@ -19,11 +19,8 @@ bool are_images(Var<S> a, Var<S> b, Var<S> weight) {
   return w.rows == image.rows && w.cols == image.cols && (w.planes == 1 || w.planes == image.planes);
 }
 
-/// Differences that count as squares where a curvature is asked for: what rounding to grey levels leaves, and some.
-inline constexpr double kLeastDifference = 0.01;
-
 /// |d|; its derivative is 0 at 0. Its curvature is that of the parabola that touches it at d and −d, the weight of
-/// iteratively reweighted least squares, 1/|d|.
+/// iteratively reweighted least squares, 1/|d|, at most 1/least.
 struct AbsoluteDifference {
   template <class S>
   static S value(S d) {
@@ -34,8 +31,8 @@ struct AbsoluteDifference {
     return d > S(0) ? S(1) : d < S(0) ? S(-1) : d;  // 0, or not a number
   }
   template <class S>
-  static S curvature(S d) {
-    return S(1) / std::max(value(d), S(kLeastDifference));
+  static S curvature(S d, S least) {
+    return S(1) / std::max(value(d), least);
   }
 };
 
@@ -50,7 +47,7 @@ struct SquaredDifference {
     return d + d;
   }
   template <class S>
-  static S curvature(S) {
+  static S curvature(S, S) {
     return S(2);
   }
 };

@@ -228,7 +228,7 @@ struct DSsimOp {
 
   bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) {
     const S g = io.d_out().scalar();
-    if (io.wants(0) && g > S(0)) {
+    if (io.wants(0) && g > S(0) && weights.rule.structural) {
       const S scale = g / static_cast<S>(io.in(0).shape.count());
       detail::add_ssim_weights(io.in(0), io.in(1), io.read(0), settings.data_range, scale, weights.of_input(io, 0));
     }

@@ -17,9 +17,6 @@ namespace {
 /// Numbers of one parallel chunk.
 constexpr Index kChunk = 8192;
 
-/// What a good step makes of the factor of the rates: 2^(1/8), so that eight make up for a bad one.
-constexpr double kRecovery = 1.0905077326652577;
-
 /// Calls run(offset in memory, offset without padding, count) for runs that together are all numbers of an array, in
 /// parallel.
 template <class F>
@@ -157,7 +154,7 @@ StepReport Adam<S>::step(Index iteration, Index iterations, double loss) {
     }
     can_undo_ = true;
     bad_in_a_row_ = 0;
-    rate_ = std::min(1.0, rate_ * kRecovery);
+    rate_ = std::min(1.0, rate_ * kRateRecovery);
   }
   report.rollbacks = rollbacks_;
   report.groups = reports_;

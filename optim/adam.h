@@ -26,6 +26,9 @@ namespace hsi4d {
 /// parameter stands still for tens of thousands of iterations.
 inline constexpr double kLargestGradient = 1e18;
 
+/// What a good step makes of the factor of all rates after bad ones: 2^(1/8), so that eight make up for a bad one.
+inline constexpr double kRateRecovery = 1.0905077326652577;
+
 /// What a group has accumulated. Without blocks: nothing yet.
 struct GroupMoments {
   struct Block {
@@ -67,6 +70,14 @@ struct GroupStep {
   double gradient_norm = 0;  ///< Euclidean norm over all its blocks; 0 when the group is off
 };
 
+/// What a method with a matrix tells of a step.
+struct MatrixStep {
+  std::optional<double> gain_ratio;  ///< lm: how much smaller the last step made the loss, of what the matrix said
+  double damping = 0;                ///< of the step that begins
+  double condition = 0;              ///< of its matrix, an estimate in the 1-norm; infinite where it has none
+  bool refused = false;              ///< lm: the last step made the loss no smaller, and was taken back
+};
+
 /// What a step did. Views are good until the next step.
 struct StepReport {
   bool rolled_back = false;      ///< no step: a number was not finite
@@ -74,6 +85,7 @@ struct StepReport {
   std::optional<BadNumber> bad;  ///< when rolled_back
   Index rollbacks = 0;           ///< so far
   std::span<const GroupStep> groups;
+  std::optional<MatrixStep> matrix = {};
 };
 
 /// Whether a group moves in an iteration: from, from + every, …, before until.

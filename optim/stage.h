@@ -37,6 +37,7 @@ struct IterationReport {
   double seconds = 0;                                   ///< of this iteration
   TapeCounters tape = {};                               ///< of this iteration
   std::span<const GradientShare> gradient_shares = {};  ///< where the settings ask for them; empty in a bad evaluation
+  std::optional<MatrixStep> matrix = {};                ///< with lm and whitened_adam
 };
 
 /// Called after every iteration. May throw to end the stage: the parameters then stay as they are.
@@ -92,7 +93,8 @@ struct StageOptions {
   /// Groups named here go on from these moments (none yet: an entry without blocks), and leave theirs here at the end.
   /// All others start afresh.
   AdamState* kept = nullptr;
-  /// bfgs goes on from this curvature (none yet: empty), and leaves there what it has learnt. Null: it starts afresh.
+  /// bfgs and whitened_adam go on from this curvature (none yet: empty), and leave there what they have learnt. Null:
+  /// they start afresh.
   std::vector<double>* curvature = nullptr;
   bool profile = false;         ///< measure the time of every node
   bool time_curvature = false;  ///< measure one more evaluation and its curvature where the stage ends
@@ -114,12 +116,12 @@ void check_groups(const StageSettings& settings, const std::vector<std::string>&
 ///
 /// Records Σ weight · term at the end of the tape, and in each iteration: lets gradients flow to the groups that are on
 /// in it and to no other of `available` (what is frozen costs nothing), runs the tape forward and backward, and takes
-/// an Adam step (optim/adam.h). Where settings.gradient_shares asks, it runs backward for each term by itself before
-/// that, which changes no result. Rows of groups that are axis-angles are wrapped after each step. Numbers of named
-/// groups that have a range are held in it, after each step and before the first evaluation. A last forward run
-/// evaluates the parameters that are left; should they give a loss that is not finite, the last step is taken back. At
-/// the end (also by an exception) what was recorded is forgotten, `available` is frozen or not as before, and nothing
-/// is held.
+/// a step of the optimiser (optim/optimizer.h). Where settings.gradient_shares asks, it runs backward for each term by
+/// itself before that, which changes no result. Rows of groups that are axis-angles are wrapped after each step.
+/// Numbers of named groups that have a range are held in it, after each step and before the first evaluation. A last
+/// forward run evaluates the parameters that are left; should they give a loss that is not finite, the last step is
+/// taken back. At the end (also by an exception) what was recorded is forgotten, `available` is frozen or not as
+/// before, and nothing is held.
 ///
 /// @param tape       holds the inputs and the parameters
 /// @param settings   what moves and which terms count; a term without settings of its own takes its defaults

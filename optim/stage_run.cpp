@@ -49,7 +49,7 @@ StageRun<S>::StageRun(Tape<S>& tape, const StageSettings& settings, std::span<co
       restored_{{tape, available}, tape, options.held},
       groups_(checked_groups(settings, available, options.name)),
       loss_(record_loss(settings, terms, inputs, options.name)),
-      optimizer_(tape, groups_, settings.optimizer) {
+      optimizer_(tape, loss_.total, groups_, settings.optimizer) {
   if (options.profile) tape.clear_statistics();
   tape.set_profiling(options.profile);
   for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
@@ -57,11 +57,12 @@ StageRun<S>::StageRun(Tape<S>& tape, const StageSettings& settings, std::span<co
   held_ = reached_outputs(options.held);
   for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
   if (options.curvature != nullptr) optimizer_.set_curvature(*options.curvature);
-  if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
+  if (options.kept == nullptr) return;
   for (const OptimizerGroup<S>& group : groups_) {
     const auto kept = options.kept->find(group.parameters.name);
-    if (kept != options.kept->end() && !kept->second.blocks.empty())
-      optimizer_.adam()->set_moments(group.parameters.name, kept->second);
+    Adam<S>* const adam = optimizer_.adam_of(group.parameters.name);
+    if (adam != nullptr && kept != options.kept->end() && !kept->second.blocks.empty())
+      adam->set_moments(group.parameters.name, kept->second);
   }
 }
 
@@ -90,10 +91,12 @@ double StageRun<S>::evaluate() {
 
 template <class S>
 void StageRun<S>::parameters_were_written() {
-  if (iteration_ > 0 && optimizer_.adam() == nullptr)
-    throw UserError(stage_message(options_.name,
-                                  "its optimiser has begun, and bfgs remembers where its steps led; "
-                                  "parameters can be written before the first step"));
+  if (iteration_ > 0 && !optimizer_.takes_other_numbers()) {
+    throw UserError(stage_message(
+        options_.name, "its optimiser has begun, and " +
+                           std::string(choice_name<OptimizerKind>(kOptimizerKinds, settings_.optimizer.kind)) +
+                           " remembers where its steps led; parameters can be written before the first step"));
+  }
   holds_old_values_ = true;
 }
 
@@ -144,11 +147,12 @@ void StageRun<S>::iterate(Index i, const StageCallback& callback, Clock::time_po
     offender_.clear();
     wrap_rotations(step);
     hold_ranges(step);
+    holds_old_values_ = step.undone;
   }
   times_.step += seconds_since(differentiated);
   if (!callback) return;
   callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
-            seconds_since(start), counters, shares_});
+            seconds_since(start), counters, shares_, step.matrix});
 }
 
 /// Held outputs that the loss depends on; what it does not is never computed.
@@ -220,7 +224,8 @@ void StageRun<S>::wrap_rotations(const StepReport& step) {
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     if (!groups_[g].parameters.are_axis_angles || !step.groups[g].moved) continue;
     for (const Var<S> block : groups_[g].parameters.blocks) {
-      for (const Index row : wrap_axis_angles(block)) optimizer_.adam()->clear_mean(block, row);
+      for (const Index row : wrap_axis_angles(block))
+        optimizer_.adam_of(groups_[g].parameters.name)->clear_mean(block, row);
     }
   }
 }
@@ -274,9 +279,7 @@ void StageRun<S>::check_reached(Index iteration) const {
 template <class S>
 void StageRun<S>::note_rollback(const BadNumber& bad, Index iteration) {
   if (offender_.empty()) offender_ = bad.text() + first_bad_node();
-  const Adam<S>* const adam = optimizer_.adam();
-  const Index count = adam != nullptr ? adam->bad_in_a_row() : optimizer_.rollbacks();
-  if (count <= settings_.optimizer.max_rollbacks) return;
+  if (optimizer_.counted_rollbacks() <= settings_.optimizer.max_rollbacks) return;
   throw_diverged("iteration " + std::to_string(iteration));
 }
 
@@ -319,7 +322,7 @@ void StageRun<S>::evaluate_the_end() {
   read_terms();
   if (std::isfinite(evaluated_loss())) return;
   offender_ = "the loss is " + rounded(evaluated_loss(), 6) + first_bad_node();
-  if (optimizer_.adam() != nullptr && optimizer_.adam()->undo()) {
+  if (optimizer_.undo()) {
     ++undone_at_end_;
     forward_of_all();
     read_terms();
@@ -336,10 +339,11 @@ void StageRun<S>::forward_of_all() {
 
 template <class S>
 void StageRun<S>::keep_moments() const {
-  if (options_.kept == nullptr || optimizer_.adam() == nullptr) return;
+  if (options_.kept == nullptr) return;
   for (const OptimizerGroup<S>& group : groups_) {
     const auto kept = options_.kept->find(group.parameters.name);
-    if (kept != options_.kept->end()) kept->second = optimizer_.adam()->moments(group.parameters.name);
+    const Adam<S>* const adam = optimizer_.adam_of(group.parameters.name);
+    if (adam != nullptr && kept != options_.kept->end()) kept->second = adam->moments(group.parameters.name);
   }
 }
 

@@ -40,7 +40,7 @@ class StageRun {
   /// iterations they move in, by Tape::gradient. No step; the iterations to come have the same bits.
   double evaluate();
   /// Has to be called after parameters of the groups were written from outside: what is held is made anew. Throws
-  /// UserError once an optimiser has begun that remembers where its steps led (bfgs).
+  /// UserError once an optimiser has begun that remembers where its steps led (all but adam).
   void parameters_were_written();
 
   /// Evaluates the parameters that are left and hands on what the optimiser has learnt; once.

@@ -58,7 +58,9 @@ const char* words_of(LossInput need) {
 }  // namespace
 
 void describe(ConfigFields& f, OptimizerSettings& s) {
-  f.choice("kind", s.kind, kOptimizerKinds, "Adam, or for few numbers such as the camera's: BFGS with a line search");
+  f.choice("kind", s.kind, kOptimizerKinds,
+           "Adam; for few numbers such as the camera's BFGS with a line search; with a Gauss-Newton matrix "
+           "Levenberg-Marquardt, or Adam in numbers that are not correlated");
   f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
@@ -66,17 +68,36 @@ void describe(ConfigFields& f, OptimizerSettings& s) {
             "Steps that may be undone because a number was not finite, in a row with adam, else in a stage; one more "
             "is an error");
   f.boolean("keep_curvature", s.keep_curvature,
-            "bfgs: begin with the curvature of the frame before, for fewer evaluations");
+            "bfgs, whitened_adam: begin with the curvature of the frame before, for fewer evaluations");
+  f.number(
+      "damping", s.damping, {.min = 1e-9, .max = 1e6},
+      "lm: share of the diagonal added to the matrix in the first step; whitened_adam: in all, beside correlations");
+  f.integer("matrix_every", s.matrix_every, {.min = 1, .max = kMostIterations},
+            "lm, whitened_adam: a new matrix in every n-th step");
+  f.integer("matrix_tiles", s.matrix_tiles, {.min = 1, .max = 64},
+            "lm, whitened_adam: one of so many tiles of the image is in a matrix, others in the next");
+  f.number("matrix_floor", s.matrix_floor, {.min = 1e-6, .max = 10},
+           "lm, whitened_adam: absolute differences of pixels below it count as squares in the matrix");
+  f.boolean("matrix_ssim", s.matrix_ssim, "lm, whitened_adam: SSIM has a part in the matrix");
 }
 
 std::vector<std::string> idle_settings(const OptimizerSettings& s) {
   const OptimizerSettings usual;
-  const bool is_adam = s.kind == OptimizerKind::kAdam;
+  const bool has_moments = s.kind != OptimizerKind::kBfgs, has_matrix = needs_matrix(s.kind);
+  const bool keeps = s.kind == OptimizerKind::kBfgs || s.kind == OptimizerKind::kWhitenedAdam;
   std::vector<std::string> idle;
-  if (is_adam && s.keep_curvature) idle.emplace_back("keep_curvature");
-  if (!is_adam && s.beta1 != usual.beta1) idle.emplace_back("beta1");
-  if (!is_adam && s.beta2 != usual.beta2) idle.emplace_back("beta2");
-  if (!is_adam && s.eps != usual.eps) idle.emplace_back("eps");
+  const auto add_if = [&idle](bool is_idle, const char* name) {
+    if (is_idle) idle.emplace_back(name);
+  };
+  add_if(!keeps && s.keep_curvature, "keep_curvature");
+  add_if(!has_moments && s.beta1 != usual.beta1, "beta1");
+  add_if(!has_moments && s.beta2 != usual.beta2, "beta2");
+  add_if(!has_moments && s.eps != usual.eps, "eps");
+  add_if(!has_matrix && s.damping != usual.damping, "damping");
+  add_if(!has_matrix && s.matrix_every != usual.matrix_every, "matrix_every");
+  add_if(!has_matrix && s.matrix_tiles != usual.matrix_tiles, "matrix_tiles");
+  add_if(!has_matrix && s.matrix_floor != usual.matrix_floor, "matrix_floor");
+  add_if(!has_matrix && s.matrix_ssim != usual.matrix_ssim, "matrix_ssim");
   return idle;
 }
 
@@ -122,7 +143,7 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
            " headings are tried by a stage over \"first_frame\" that draws \"all\"; allowed here: 1";
   });
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
-    if (s.optimizer.kind == OptimizerKind::kAdam) return "";
+    if (s.optimizer.kind != OptimizerKind::kBfgs) return "";
     for (const auto& [name, group] : s.optimize) {
       if (group.from != 0 || group.until || group.every != 1 || group.lr_final_share != 1)
         return std::string(choice_name<OptimizerKind>(kOptimizerKinds, s.optimizer.kind)) +

@@ -14,12 +14,16 @@
 
 namespace hsi4d {
 
-enum class OptimizerKind { kAdam, kBfgs };
+enum class OptimizerKind { kAdam, kBfgs, kLm, kWhitenedAdam };
 
-inline constexpr std::array<ConfigChoice<OptimizerKind>, 2> kOptimizerKinds = {
-    {{OptimizerKind::kAdam, "adam"}, {OptimizerKind::kBfgs, "bfgs"}}};
+inline constexpr std::array<ConfigChoice<OptimizerKind>, 4> kOptimizerKinds = {
+    {{OptimizerKind::kAdam, "adam"},
+     {OptimizerKind::kBfgs, "bfgs"},
+     {OptimizerKind::kLm, "lm"},
+     {OptimizerKind::kWhitenedAdam, "whitened_adam"}}};
 
-/// How gradients become steps. beta1, beta2 and eps are Adam's.
+/// How gradients become steps. beta1, beta2 and eps are Adam's; what begins with matrix is of the Gauss-Newton matrix
+/// of lm and whitened_adam (autodiff/curvature.h).
 struct OptimizerSettings {
   OptimizerKind kind = OptimizerKind::kAdam;
   double beta1 = 0.9;
@@ -27,7 +31,17 @@ struct OptimizerSettings {
   double eps = 1e-8;
   int max_rollbacks = 10;       ///< bad steps in a row (in all, but with adam) that are undone; one more is an error
   bool keep_curvature = false;  ///< a frame begins with what was learnt in the frame before
+  double damping = 0.01;        ///< lm: the first; whitened_adam: what is added to correlations
+  int matrix_every = 1;         ///< a new matrix in every n-th step
+  int matrix_tiles = 1;         ///< one tile of n counts, n times
+  double matrix_floor = 0.01;   ///< differences of pixels below it count as squares
+  bool matrix_ssim = true;      ///< SSIM has a part in it
 };
+
+/// Whether a kind makes Gauss-Newton matrices.
+inline bool needs_matrix(OptimizerKind kind) {
+  return kind == OptimizerKind::kLm || kind == OptimizerKind::kWhitenedAdam;
+}
 
 /// Names of settings that are not the usual ones and that this kind of optimiser does not look at.
 std::vector<std::string> idle_settings(const OptimizerSettings& settings);

@@ -27,14 +27,16 @@ void for_numbers(const std::vector<OptimizerGroup<S>>& groups, const F& visit) {
 }  // namespace
 
 template <class S>
-UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const std::string& method)
+UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const std::string& method,
+                            bool ranges)
     : tape_(tape), groups_(std::move(groups)) {
   Index count = 0;
   for (const OptimizerGroup<S>& group : groups_) {
     reports_.push_back({group.parameters.name});
-    if (group.parameters.are_axis_angles || group.parameters.range) {
-      throw UserError("group \"" + group.parameters.name + "\": " + method +
-                      " does not move numbers that are held in a range, or rotations as axis and angle; "
+    if (group.parameters.are_axis_angles || (group.parameters.range && !ranges)) {
+      throw UserError("group \"" + group.parameters.name + "\": " + method + " does not move " +
+                      (ranges ? "" : "numbers that are held in a range, or ") +
+                      "rotations as axis and angle; "
                       "allowed: rotations \"6d\", or the optimizer adam");
     }
     for (const Var<S> block : group.parameters.blocks) count += tape.shape(block).count();
@@ -45,9 +47,32 @@ UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups
   }
   unit_.setZero(count);
   start_.setZero(count);
+  low_.setZero(count);
+  high_.setZero(count);
   for_numbers(groups_, [&](Index i, const OptimizerGroup<S>& group, Var<S> block, Index r, Index c) {
     unit_[i] = group.settings.lr;
-    if (unit_[i] > 0) start_[i] = static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i];
+    if (!(unit_[i] > 0)) return;
+    start_[i] = static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i];
+    const std::optional<ParameterRange>& range = group.parameters.range;
+    low_[i] = std::max(start_[i] - kLongestUnitWay, range ? range->low / unit_[i] : -HUGE_VAL);
+    high_[i] = std::min(start_[i] + kLongestUnitWay, range ? range->high / unit_[i] : HUGE_VAL);
+  });
+}
+
+template <class S>
+std::vector<Var<S>> UnitNumbers<S>::blocks() const {
+  std::vector<Var<S>> all;
+  for (const OptimizerGroup<S>& group : groups_)
+    all.insert(all.end(), group.parameters.blocks.begin(), group.parameters.blocks.end());
+  return all;
+}
+
+template <class S>
+void UnitNumbers<S>::read_shares(Index iteration, Index iterations, VectorX& shares) const {
+  for_numbers(groups_, [&](Index i, const OptimizerGroup<S>& group, Var<S>, Index, Index) {
+    const ParameterGroupSettings& moving = group.settings;
+    shares[i] =
+        moving.lr > 0 && moves_in(moving, iteration) ? scheduled_rate(moving, iteration, iterations) / moving.lr : 0.0;
   });
 }
 

@@ -27,15 +27,25 @@ class UnitNumbers {
 
   /// @param groups  leaves of `tape`, none of them twice
   /// @param method  what messages call it
+  /// @param ranges  whether the method keeps to low() and high(), and so to ranges of groups
   /// Throws UserError for more than kMostUnitNumbers numbers, and for groups whose numbers are changed between steps
   /// (axis-angles, ranges).
-  UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const std::string& method);
+  UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const std::string& method, bool ranges = false);
   UnitNumbers(const UnitNumbers&) = delete;
   UnitNumbers& operator=(const UnitNumbers&) = delete;
 
   Index count() const { return unit_.size(); }
   /// z when this was made.
   const VectorX& start() const { return start_; }
+  /// The least and the largest z: of the groups' ranges, and kLongestUnitWay from the start.
+  const VectorX& low() const { return low_; }
+  const VectorX& high() const { return high_; }
+  /// lr of each number.
+  const VectorX& unit() const { return unit_; }
+  /// All arrays, in order.
+  std::vector<Var<S>> blocks() const;
+  /// Learning rate of each number in an iteration, of that of the settings; 0 where its group is off.
+  void read_shares(Index iteration, Index iterations, VectorX& shares) const;
 
   /// The gradient by z of the tape's last backward; 0 where there is none. Returns the first number that is not finite,
   /// the loss among them.
@@ -55,7 +65,7 @@ class UnitNumbers {
   Tape<S>& tape_;
   std::vector<OptimizerGroup<S>> groups_;
   std::vector<GroupStep> reports_;
-  VectorX unit_, start_;
+  VectorX unit_, start_, low_, high_;
 };
 
 extern template class UnitNumbers<float>;

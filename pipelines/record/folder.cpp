@@ -140,6 +140,16 @@ ConfigValue record_number(double value, const std::string& pointer, bool rolled_
   return ConfigValue::make_number(value);
 }
 
+/// A condition that is infinite is null.
+ConfigValue matrix_json(const MatrixStep& step) {
+  ConfigValue object = ConfigValue::make_object();
+  if (step.gain_ratio) object.add("gain_ratio", record_number(*step.gain_ratio, "/matrix/gain_ratio", true));
+  object.add("damping", record_number(step.damping, "/matrix/damping", false));
+  object.add("condition", record_number(step.condition, "/matrix/condition", true));
+  if (step.refused) object.add("refused", ConfigValue::make_boolean(true));
+  return object;
+}
+
 std::string metrics_line(const IterationRecord& record) {
   ConfigValue line = ConfigValue::make_object();
   if (record.frame) line.add("frame", ConfigValue::make_integer(*record.frame));
@@ -151,6 +161,7 @@ std::string metrics_line(const IterationRecord& record) {
     losses.add(name, record_number(value, child_pointer("/losses", name), record.rolled_back));
   line.add("losses", std::move(losses));
   if (!record.gradient_shares.empty()) line.add("gradient_shares", gradient_shares_json(record.gradient_shares));
+  if (record.matrix) line.add("matrix", matrix_json(*record.matrix));
   for (const auto& [name, value] : record.counters)
     line.add(name, record_number(value, child_pointer("", name), false));
   line.add("seconds", record_number(record.seconds, "/seconds", false));

@@ -47,6 +47,7 @@ struct IterationRecord {
   double seconds = 0;
   bool rolled_back = false;  ///< the step was undone; numbers that are not finite are then written as null
   std::span<const GradientShare> gradient_shares = {};
+  std::optional<MatrixStep> matrix = {};
   MetricValues counters = {};  ///< work done: channels, tiles, pairs, groups, fragments, layers, adjoint_tiles
 };
 

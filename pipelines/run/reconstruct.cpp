@@ -454,6 +454,7 @@ class Reconstruction {
     record.seconds = report.seconds;
     record.rolled_back = report.rolled_back;
     record.gradient_shares = report.gradient_shares;
+    record.matrix = report.matrix;
     if (counters != nullptr) add_counters(*counters, *totals, record);
     for (const auto& [name, count] : {std::pair{"forward_nodes", report.tape.forward_nodes},
                                       {"backward_nodes", report.tape.backward_nodes},

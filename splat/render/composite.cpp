@@ -470,7 +470,7 @@ struct Composite {
   // --- curvature -----------------------------------------------------------------------------------------------------
 
   /// By shares of the tiles that the number of threads does not change; every kShares-th is of one share, so that all
-  /// have as much of what is dense.
+  /// have as much of what is dense. Of a sample of tiles each counts for those beside it.
   void collect(NodeIo<S>& io, const CurvatureWeights<S>& weights, const Movers<S>& movers, double* sum) {
     constexpr Index kShares = 16;
     const TileGrid tiles = grid();
@@ -482,15 +482,22 @@ struct Composite {
       double* const mine = shares.data() + share * numbers;
       std::fill_n(mine, numbers, 0.0);
       for (Index tile = share; tile < tiles.count(); tile += kShares) {
-        if (tile_counts[tile].end > 0) detail::add_tile_curvature(scene, curvature_tile(tiles, tile), workspace, mine);
+        if (tile_counts[tile].end > 0 && is_sampled(tiles, tile, weights.rule))
+          detail::add_tile_curvature(scene, curvature_tile(tiles, tile), workspace, mine);
       }
     });
     parallel_for(numbers, kGrain, [&](Index begin, Index end) {
       for (Index share = 0; share < kShares; ++share) {
         const double* const from = shares.data() + share * numbers;
-        for (Index i = begin; i < end; ++i) sum[i] += from[i];
+        for (Index i = begin; i < end; ++i) sum[i] += static_cast<double>(weights.rule.tiles) * from[i];
       }
     });
+  }
+
+  /// Tiles of a sample are no column: rows of tiles begin elsewhere.
+  static bool is_sampled(const TileGrid& tiles, Index tile, const CurvatureRule& rule) {
+    const Index step = (rule.tiles / 2) | 1, row = tile / tiles.cols, col = tile % tiles.cols;
+    return (col + step * row + rule.turn) % rule.tiles == 0;
   }
 
   detail::CurvatureScene<S> curvature_scene(const NodeIo<S>& io, const CurvatureWeights<S>& weights,

@@ -73,10 +73,11 @@ std::vector<float> stepped(const StageSettings& settings, const std::vector<std:
 
 TEST_CASE("steps and an end have the bits of run_stage, whatever is evaluated in between") {
   for (const bool holds : {false, true}) {
-    for (const bool is_bfgs : {false, true}) {
-      CAPTURE(holds, is_bfgs);
+    for (const auto& [kind, name] : kOptimizerKinds) {
+      CAPTURE(holds, name);
       StageSettings settings = settings_of(20);
-      if (is_bfgs) settings.optimizer.kind = OptimizerKind::kBfgs;
+      settings.optimizer.kind = kind;
+      settings.optimizer.matrix_every = 3;
       const std::vector<std::string> held_by = holds ? std::vector<std::string>{"base"} : std::vector<std::string>();
       Picture picture;
       StageOptions options;

@@ -107,6 +107,18 @@ TEST_CASE("a loss that is not finite is refused by name, but told of a step that
   CHECK(line["losses"]["masked_l2"].is_null());
   CHECK(line["loss"] == 0.5);
   CHECK(line["rolled_back"] == true);
+  CHECK_FALSE(line.contains("matrix"));
+}
+
+TEST_CASE("what a method with a matrix tells is in the line of its iteration") {
+  const TemporaryFolder here;
+  RunFolder folder("a", identity(), false);
+  IterationRecord told = record(1, 0);
+  told.matrix = {0.75, 0.01, HUGE_VAL, true};
+  folder.append_metrics(told);
+  const auto line = nlohmann::json::parse(file_text("a/metrics.jsonl"));
+  CHECK(line["matrix"] ==
+        nlohmann::json({{"gain_ratio", 0.75}, {"damping", 0.01}, {"condition", nullptr}, {"refused", true}}));
 }
 
 TEST_CASE("a folder that holds something is refused without resume") {

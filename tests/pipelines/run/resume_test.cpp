@@ -112,6 +112,24 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
   }
 }
 
+TEST_CASE("a run whose stages have matrices that was stopped and resumed has the bits of one that never was", "[run]") {
+  const TemporaryFolder here;
+  RunConfig config = tiny_config();
+  StageSettings& camera = config.stages.front().second;
+  camera.optimizer.kind = OptimizerKind::kWhitenedAdam;
+  camera.optimizer.keep_curvature = true;
+  camera.optimizer.matrix_every = 3;
+  StageSettings& interaction = config.stages.back().second;
+  interaction.optimizer.kind = OptimizerKind::kLm;
+  interaction.optimizer.matrix_tiles = 2;
+  execute_tiny(config, "whole");
+  int count = 0;
+  const int last = 2 * kPerFrame;  // or the end of a stage that is done before
+  CHECK_THROWS_AS(execute_tiny(config, "stopped", 1, false, [&] { return ++count == last; }), Interrupted);
+  execute_tiny(config, "stopped", 2, true);
+  CHECK(differences("whole", "stopped") == kNone);
+}
+
 TEST_CASE("a run resumed with another instruction set says that the bits will differ", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config();

@@ -179,7 +179,7 @@ Matrix dense_of_loss(Graph<double>& g) {
     const auto pixel = static_cast<std::size_t>(row * kWidth + col);
     const auto at = static_cast<std::size_t>(plane * kWidth * kHeight) + pixel;
     const double w = weight[pixel], d = std::abs(w * (image[at] - target[at]));
-    return 0.7 * 2 * w / colors + 0.4 * w * w / std::max(d, hsi4d::detail::kLeastDifference) / colors;
+    return 0.7 * 2 * w / colors + 0.4 * w * w / std::max(d, CurvatureRule{}.least_difference) / colors;
   });
   const Matrix of_mask = dense(g, g.render.more_channels, [&](Index, Index, Index) { return 0.2 * 2 / pixels; });
   return of_colors + of_mask + dense(g, g.transl, [](Index, Index, Index) { return 0.3 * 2; });
@@ -205,6 +205,26 @@ TEST_CASE("a curvature is the same over static layers and without them") {
   Graph<float> layered, plain;
   plain.view.skip.static_layer = false;
   CHECK(error(layered.curvature(loss_of(layered)), plain.curvature(loss_of(plain))) < 1e-5);
+}
+
+TEST_CASE("samples of tiles are together the whole curvature") {
+  Graph<double> g, whole;
+  const Matrix expected = whole.curvature(loss_of(whole));
+  const Var<double> loss = loss_of(g);
+  for (const Index tiles : {2, 3, 4}) {
+    INFO("one tile of " << tiles);
+    Curvature<double> curvature(g.tape, loss, g.leaves(), {.tiles = tiles});
+    Matrix sum = Matrix::Zero(expected.rows(), expected.cols()), last = sum;
+    for (Index turn = 0; turn < tiles; ++turn) {
+      g.tape.forward(loss);
+      g.tape.backward(loss);
+      const Matrix sample = curvature.compute();
+      CHECK(error(sample, last) > 1e-3);  // others than before
+      sum += sample;
+      last = sample;
+    }
+    CHECK(error(sum / static_cast<double>(tiles), expected) < 1e-12);
+  }
 }
 
 TEST_CASE("a curvature has the same bits on any number of threads", "[parallel]") {
