@@ -51,14 +51,16 @@ double no_joint(Index, Index) { return 0; }
 }  // namespace
 
 TEST_CASE("fit is the mean over the moving frames of the squared distances of 22 joints") {
-  const double loss = motion_loss("fit", "{}", [](Index t, Index) { return t >= kStill ? 0.1 : 0; });
-  CHECK(loss == Approx(66 * 0.01).epsilon(1e-13));
+  const auto moved = [](Index t, Index) { return t >= kStill ? 0.1 : 0; };
+  CHECK(motion_loss("fit", "{}", moved) == Approx(66 * 0.01).epsilon(1e-13));
+  CHECK(motion_loss("fit", R"({"joints": "mean"})", moved) == Approx(0.01).epsilon(1e-13));
 }
 
 TEST_CASE("smooth is the mean over adjacent frames of the squared differences of the order that is asked for") {
   const auto speeding = [](Index t, Index c) { return c < 3 ? 0.1 * static_cast<double>(t * t) : 0; };
   // Steps 0.1 (between frames that stand), 0.3, 0.5, 0.7; their changes 0.2; the changes of these 0.
   CHECK(motion_loss("smooth", "{}", speeding) == Approx(3 * (0.09 + 0.25 + 0.49) / 3).epsilon(1e-13));
+  CHECK(motion_loss("smooth", R"({"frames": "sum"})", speeding) == Approx(3 * (0.09 + 0.25 + 0.49)).epsilon(1e-13));
   CHECK(motion_loss("smooth", R"({"order": 2})", speeding) == Approx(3 * 0.04).epsilon(1e-13));
   CHECK(std::fabs(motion_loss("smooth", R"({"order": 3})", speeding)) < 1e-28);
 }

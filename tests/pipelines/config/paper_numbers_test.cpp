@@ -98,6 +98,8 @@ TEST_CASE("the paper's numbers are those of its configs") {
     CHECK(config["color_net"]["use"] == "on");
     for (const auto& [name, stage] : config["stages"].items()) CHECK(stage["optimizer"]["kind"] == "adam");
     CHECK(config["stages"]["refinement"]["losses"]["contact"]["points"] == "vertices");  // C.4: hand vertices
+    CHECK(config["stages"]["refinement"]["losses"]["fit"]["joints"] == "mean");  // Alg. 1: the L2 of the camera's loss
+    CHECK(config["stages"]["refinement"]["losses"]["smooth"]["frames"] == "sum");  // S4: no 1/T before L_smooth
     CHECK(config["camera"]["increment"] == "scene");
     const Json& center = config["stages"]["interaction"]["losses"]["center"];
     CHECK(center["unit"] == "pixels");
