@@ -368,11 +368,13 @@ class Reconstruction {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(std::nullopt, s, report, nullptr, nullptr);
     };
+    const std::vector<SceneState> before = states;
     const StageResult result =
         run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
     drop_what_is_left(s, result);
     warn_of_terms_off(result.off, name, stage);
     warn_of_idle_terms(result.notes, name);
+    warn_of_still_joints(clip_, before, states, name);
     folder_.note("all frames, " + stage_text(name, result, begin, clip_));
     return {result.iterations, result.rollbacks, result.seconds};
   }

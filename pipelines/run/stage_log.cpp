@@ -4,11 +4,14 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "optim/metrics.h"
 #include "pipelines/draw/view_turn.h"
 
 namespace hsi4d {
 
 namespace {
+
+constexpr double kLeastMoveMm = 0.1;  // of a stage over the sequence that does something
 
 std::string left_out_line(const StageResult& result, const Clip& clip) {
   std::string text;
@@ -120,6 +123,23 @@ void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& s
   for (const LossNote& note : notes) {
     if (note.is_idle) log_warning("stage " + stage + ": the loss \"" + note.term + "\" moves nothing: " + note.text);
   }
+}
+
+void warn_of_still_joints(const Clip& clip, const std::vector<SceneState>& before, const std::vector<SceneState>& after,
+                          const std::string& stage) {
+  double sum = 0;
+  Index count = 0;
+  for (std::size_t t = 1; t < after.size(); ++t) {
+    const std::vector<double> from = pose_joints(clip.avatar, before[t].body),
+                              to = pose_joints(clip.avatar, after[t].body);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(3 * kMetricJoints); i += 3)
+      sum += (Vector3<double>(to.data() + i) - Vector3<double>(from.data() + i)).norm();
+    count += kMetricJoints;
+  }
+  const double moved_mm = 1000 * sum / static_cast<double>(count);
+  if (moved_mm >= kLeastMoveMm) return;
+  log_warning("stage " + stage + ": the joints have moved by " + rounded(moved_mm, 2) +
+              " mm on average, next to nothing: the weights or the learning rates leave the body where it was");
 }
 
 void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings) {

@@ -44,6 +44,12 @@ class GradientWatch {
 /// Every term of a stage that moves nothing by what it found: one warning, with that.
 void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage);
 
+/// A stage over the sequence that leaves the joints where they were: less than a tenth of a millimetre on average is a
+/// warning, with how far. Its terms then hold each other, or nothing moves.
+/// @param before, after  by frame, frame 0, which stands, included
+void warn_of_still_joints(const Clip& clip, const std::vector<SceneState>& before, const std::vector<SceneState>& after,
+                          const std::string& stage);
+
 /// Every term of a stage that is off: one warning, with the reason.
 void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings);
 

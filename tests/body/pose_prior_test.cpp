@@ -196,10 +196,11 @@ TEST_CASE("faults of VPoser's weights are named") {
 }
 
 TEST_CASE("priors pass the operator checks", "[parallel]") {
-  const PosePrior vposer = vposer_prior(random_vposer(24, 6, 5).weights()), natural = natural_pose_prior();
+  const PosePrior vposer = vposer_prior(random_vposer(24, 6, 5).weights()), natural = natural_pose_prior(),
+                  shipped = read_pose_prior(std::string(HSI4D_SOURCE_DIR) + "/configs/pose_prior.npz");
   RandomNumbers random(6);
   const Numbers rotations = matrices_of(random.numbers(2 * 63, 1.2));
-  for (const PosePrior* prior : {&vposer, &natural}) {
+  for (const PosePrior* prior : {&vposer, &natural, &shipped}) {
     // Latents that are the same for every seed: random weights make some rotation's columns nearly parallel for others.
     const OperatorInput latents{"z", shape_of(2, prior->latents()), 0, 0, random.numbers(2 * prior->latents(), 0.7)};
     const OperatorInput pose{"rotations", shape_of(42, 9), 0, 0, rotations};

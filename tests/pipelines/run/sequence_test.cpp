@@ -255,6 +255,17 @@ TEST_CASE("contact draws vertices of the body that the avatar was made on, else 
                "joints of the avatar are "));
 }
 
+TEST_CASE("a stage over the sequence that leaves the body where it was is told", "[run][sequence]") {
+  const TemporaryFolder here;
+  execute_tiny(
+      refined_config({"stages.refinement.optimize.transl.lr=1e-7", "stages.refinement.optimize.global_orient.lr=0",
+                      "stages.refinement.optimize.pose_latents.lr=0"}),
+      "still");
+  execute_tiny(refined_config(), "moved");
+  CHECK_THAT(file_text("still/log.txt"), Contains("stage refinement: the joints have moved by 0.00"));
+  CHECK_THAT(file_text("moved/log.txt"), !Contains("the joints have moved by"));
+}
+
 TEST_CASE("a run whose stage over the sequence has VPoser's weights moves in its latents", "[run][sequence]") {
   const TemporaryFolder here;
   const Bytes bytes = random_vposer(48, 32, 11).npz();
