@@ -20,9 +20,6 @@ enum class DepthMapKind { kDepth, kDisparity };
 
 constexpr std::array<ConfigChoice<DepthMapKind>, 2> kKinds = {
     {{DepthMapKind::kDepth, "depth"}, {DepthMapKind::kDisparity, "disparity"}}};
-constexpr std::array<ConfigChoice<RobustKernel>, 3> kKernels = {{{RobustKernel::kNone, "squared"},
-                                                                 {RobustKernel::kHuber, "huber"},
-                                                                 {RobustKernel::kGemanMcClure, "geman_mcclure"}}};
 
 /// Least weight of all pixels, and least square of the render's spread, m² or 1/m²: what has less tells nothing.
 constexpr double kLeastWeight = 1e-6, kLeastSpread = 1e-8;
@@ -37,11 +34,14 @@ void describe(ConfigFields& fields, DepthMapSettings& settings) {
   fields.choice("kind", settings.kind, kKinds,
                 "What the maps of data.depth_maps hold, up to scale and shift: depth, which grows with the distance, "
                 "or disparity, which falls with it");
-  fields.choice("kernel", settings.kernel, kKernels,
+  fields.choice("kernel", settings.kernel, kSquareKernels,
                 "Of a difference: its square; huber, constant pull beyond scale; geman_mcclure, by which one far "
                 "beyond scale no longer pulls");
   fields.number("scale", settings.scale, {.above = 0, .max = 100},
                 "Difference up to which the kernel is nearly the square, of the map's standard deviation");
+  fields.rule({"scale", "kernel"}, [&settings] {
+    return idle_scale_text(settings.kernel, settings.scale, DepthMapSettings().scale, "squared");
+  });
 }
 
 /// Of each pixel: how much it counts, and what the map is compared with.

@@ -11,10 +11,6 @@ namespace hsi4d {
 
 namespace {
 
-constexpr std::array<ConfigChoice<RobustKernel>, 3> kKernels = {{{RobustKernel::kNone, "squared"},
-                                                                 {RobustKernel::kHuber, "huber"},
-                                                                 {RobustKernel::kGemanMcClure, "geman_mcclure"}}};
-
 struct MaskSettings {
   bool human = true, objects = true;
   RobustKernel kernel = RobustKernel::kNone;
@@ -24,11 +20,14 @@ struct MaskSettings {
 void describe(ConfigFields& fields, MaskSettings& settings) {
   fields.boolean("human", settings.human, "The human's silhouette counts");
   fields.boolean("objects", settings.objects, "The objects' silhouettes count");
-  fields.choice("kernel", settings.kernel, kKernels,
+  fields.choice("kernel", settings.kernel, kSquareKernels,
                 "Of a pixel's difference: its square; huber, constant pull beyond scale; geman_mcclure, by which one "
                 "far beyond scale no longer pulls");
   fields.number("scale", settings.scale, {.above = 0, .max = 10},
                 "Difference of opacity and mask up to which a kernel is nearly the square");
+  fields.rule({"scale", "kernel"}, [&settings] {
+    return idle_scale_text(settings.kernel, settings.scale, MaskSettings().scale, "squared");
+  });
 }
 
 std::vector<LossInput> opacities_of(const MaskSettings& settings) {

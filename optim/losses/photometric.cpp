@@ -32,6 +32,9 @@ void describe(ConfigFields& fields, PhotometricSettings& settings) {
                 "geman_mcclure, by which one far beyond scale no longer pulls");
   fields.number("scale", settings.scale, {.above = 0, .max = 10},
                 "Difference up to which a kernel is nearly the square; 0.1 is 25 grey levels of 255");
+  fields.rule({"scale", "kernel"}, [&settings] {
+    return idle_scale_text(settings.kernel, settings.scale, PhotometricSettings().scale, "absolute");
+  });
   fields.rule({"kernel", "ssim_share"}, [&settings]() -> std::string {
     if (settings.kernel == RobustKernel::kNone || settings.ssim_share < 1) return "";
     return "there is nothing that a kernel counts: ssim_share is 1; allowed: less, or \"absolute\"";

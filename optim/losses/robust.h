@@ -1,10 +1,13 @@
 // Robust functions of squared distances that terms share.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <string>
 #include <type_traits>
 
 #include "autodiff/dual.h"
+#include "core/config.h"
 
 namespace hsi4d {
 
@@ -14,6 +17,19 @@ enum class RobustKernel {
   kHuber,        ///< constant pull
   kGemanMcClure  ///< it no longer pulls
 };
+
+/// Of terms that are squares without one.
+inline constexpr std::array<ConfigChoice<RobustKernel>, 3> kSquareKernels = {
+    {{RobustKernel::kNone, "squared"},
+     {RobustKernel::kHuber, "huber"},
+     {RobustKernel::kGemanMcClure, "geman_mcclure"}}};
+
+/// What is wrong with a scale that is not the default where no kernel reads it; else nothing.
+/// @param none  the word for no kernel
+inline std::string idle_scale_text(RobustKernel kernel, double scale, double default_scale, const std::string& none) {
+  if (kernel != RobustKernel::kNone || scale == default_scale) return "";
+  return "does nothing with kernel \"" + none + "\"; allowed: kernel \"huber\" or \"geman_mcclure\", or no scale";
+}
 
 /// r² up to the scale s, then 2 s |r| − s². [Huber 1964]
 /// @param squared  r²

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "optim/metrics.h"
 #include "pipelines/avatar/offsets.h"
@@ -74,9 +75,8 @@ std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const View
   for (const PosedView& view : set.views) {
     const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
     if (camera.width != first.width || camera.height != first.height) {
-      throw UserError(set.file.string() + ": camera " + std::to_string(view.camera) + " has " +
-                      std::to_string(camera.width) + "x" + std::to_string(camera.height) + " pixels, another " +
-                      std::to_string(first.width) + "x" + std::to_string(first.height) + "; allowed: one size");
+      throw UserError(set.file.string() + ": camera " + std::to_string(view.camera) + " has " + size_text(camera) +
+                      " pixels, another " + size_text(first) + "; allowed: one size");
     }
     LoadedView& loaded = views.emplace_back();
     loaded.xi = se3_log(compose(camera.camera_from_world, inverse(first.camera_from_world)));

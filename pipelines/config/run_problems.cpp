@@ -375,6 +375,19 @@ void add_hint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   }
 }
 
+/// Shipped configs serve clips without objects too: that is no reason to warn.
+void add_object_notes(const RunConfig& config, std::vector<RunNote>& notes) {
+  if (!config.data.objects.empty()) return;
+  std::vector<std::string> off;
+  for (const auto& [name, stage] : config.stages) {
+    for (const auto& [term, settings] : stage.losses) {
+      if (is_of_objects(settings) && std::find(off.begin(), off.end(), term) == off.end()) off.push_back(term);
+    }
+  }
+  if (!off.empty())
+    notes.push_back({LogLevel::kInfo, "there are no objects: losses of objects are off (" + joined(off) + ")"});
+}
+
 /// Headings that nothing tells apart.
 void add_keypoint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   if (!config.data.keypoints.empty() || finds_person(config.sources, {}) || !config.chain.empty()) return;
@@ -543,8 +556,15 @@ void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use,
   for (const RunProblem& problem : found) problems.add(origin_at(tree, problem.pointer), problem.pointer, problem.text);
 }
 
+bool is_of_objects(const LossSettings& loss) {
+  return !needs_input(loss, LossInput::kHumanOpacity) &&
+         (needs_input(loss, LossInput::kObjectDepth) || needs_input(loss, LossInput::kObjectOpacity) ||
+          needs_input(loss, LossInput::kObjectMotion));
+}
+
 std::vector<RunNote> run_notes(const RunConfig& config) {
   std::vector<RunNote> notes = optimizer_notes(config);
+  add_object_notes(config, notes);
   add_keypoint_notes(config, notes);
   add_file_notes(config, notes);
   add_hint_notes(config, notes);

@@ -6,6 +6,7 @@
 
 #include "core/check.h"
 #include "core/mask_image.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/follow/pictures.h"
 #include "pipelines/follow/vision_library.h"
@@ -23,8 +24,6 @@ constexpr double kCoreShare = 0.25;   // of the pixels around a click that are t
 constexpr double kNearlyMost = 0.9;   // of the largest change across a border
 constexpr double kClickMargin = 0.1;  // of a region's side, by which the object may be larger
 constexpr double kBoxMargin = 0.25;   // of the box's side, of what is looked at around it
-
-std::string size_of(const Image& image) { return std::to_string(image.width()) + "x" + std::to_string(image.height()); }
 
 double color_distance(const Image& image, const PixelAt& a, const PixelAt& b) {
   double sum = 0;
@@ -183,7 +182,7 @@ PixelAt pixel_of(const std::array<double, 2>& click, const Image& frame, const I
   const auto [x, y] = click;
   if (!(x >= 0 && y >= 0 && x < frame.width() && y < frame.height()))
     throw UserError(name + ": " + number_text(x) + "," + number_text(y) + " is outside of the first frame, which has " +
-                    size_of(frame) + " pixels");
+                    size_text(frame) + " pixels");
   return {std::min(image.width() - 1, static_cast<int>(x * image.width() / frame.width())),
           std::min(image.height() - 1, static_cast<int>(y * image.height() / frame.height()))};
 }
@@ -192,7 +191,7 @@ PixelBox pixels_of(const std::vector<double>& box, const Image& frame, const Ima
   const double x0 = std::max(box[0], 0.0), y0 = std::max(box[1], 0.0), x1 = std::min<double>(box[2], frame.width()),
                y1 = std::min<double>(box[3], frame.height());
   if (!(x0 < x1 && y0 < y1))
-    throw UserError(name + ": the box has nothing in it of the first frame, which has " + size_of(frame) +
+    throw UserError(name + ": the box has nothing in it of the first frame, which has " + size_text(frame) +
                     " pixels; allowed: X0,Y0,X1,Y1 with X0 < X1 and Y0 < Y1");
   const double to_x = static_cast<double>(image.width()) / frame.width(),
                to_y = static_cast<double>(image.height()) / frame.height();
@@ -203,7 +202,8 @@ PixelBox pixels_of(const std::vector<double>& box, const Image& frame, const Ima
 Image read_first_mask(const std::filesystem::path& file, const Image& frame, const std::string& name) {
   const Image mask = read_mask_image(file.string());
   if (mask.width() != frame.width() || mask.height() != frame.height())
-    throw DataError(file.string() + ": the mask is " + size_of(mask) + " pixels, the first frame " + size_of(frame));
+    throw DataError(file.string() + ": the mask is " + size_text(mask) + " pixels, the first frame " +
+                    size_text(frame));
   if (!shows_something(mask))
     throw DataError(file.string() + ": the mask is empty; " + name + " is to show the object");
   return mask;

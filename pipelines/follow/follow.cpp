@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/progress.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/config/masks.h"
 #include "pipelines/follow/pictures.h"
@@ -22,17 +23,13 @@ constexpr Index kSheetPictures = 24;  // at most
 constexpr int kSheetColumns = 6, kSheetSide = 192;
 constexpr int kSheetBorder = 3;  // pixels
 
-std::string size_text_of(const Image& image) {
-  return std::to_string(image.width()) + "x" + std::to_string(image.height());
-}
-
 std::string_view state_name(Followed state) {
   return state == Followed::kSeen ? "seen" : state == Followed::kDoubtful ? "doubtful" : "not found";
 }
 
 void check_same_size(const Image& image, const Image& first, const std::string& place) {
   if (image.height() != first.height() || image.width() != first.width())
-    throw DataError(place + ": is " + size_text_of(image) + " pixels, the first frame " + size_text_of(first));
+    throw DataError(place + ": is " + size_text(image) + " pixels, the first frame " + size_text(first));
 }
 
 /// Throws DataError where pictures or objects are too small, at the size at which they are looked at.
@@ -40,12 +37,12 @@ void check_large_enough(const Image& frame, const std::vector<ObjectToFollow>& o
                         const std::string& place) {
   const Image image = reduced_to(frame, longest_side_px);
   if (std::min(image.width(), image.height()) < kLeastFollowSide)
-    throw DataError(place + ": is " + size_text_of(frame) + " pixels, and looked at with " + size_text_of(image) +
+    throw DataError(place + ": is " + size_text(frame) + " pixels, and looked at with " + size_text(image) +
                     "; objects are followed where both are at least " + std::to_string(kLeastFollowSide));
   for (const ObjectToFollow& object : objects) {
     if (!shows_something(reduced_to(object.mask, longest_side_px)))
       throw DataError(object.name + ": its mask in the first frame is too small to be followed in pictures of " +
-                      size_text_of(image) + " pixels");
+                      size_text(image) + " pixels");
   }
 }
 

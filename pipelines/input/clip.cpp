@@ -10,12 +10,14 @@
 #include "core/log.h"
 #include "core/mask_image.h"
 #include "core/parallel.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "optim/solid/mesh_distance.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/frame_cameras.h"
 #include "pipelines/input/pose_estimate.h"
+#include "pipelines/input/straight_keypoints.h"
 
 namespace hsi4d {
 
@@ -70,14 +72,6 @@ bool is_there(const fs::path& path, const char* key, const char* use) {
   if (path.empty() || fs::exists(path)) return !path.empty();
   log_warning(path.string() + ": there is no such file or folder (data." + key + "); " + use);
   return false;
-}
-
-std::string size_text(const Image& image) {
-  return std::to_string(image.width()) + "x" + std::to_string(image.height());
-}
-
-std::string size_text(const Camera& camera) {
-  return std::to_string(camera.width) + "x" + std::to_string(camera.height);
 }
 
 bool has_size_of(const Image& image, const Camera& camera) {
@@ -304,16 +298,7 @@ void set_lens(const Lens& lens, Clip& clip) {
   video.lens = lens;
   video.camera = clip.camera;
   clip.video = std::make_shared<const ClipVideo>(std::move(video));
-  if (!clip.keypoints) return;
-  const Camera& camera = clip.camera;
-  for (std::vector<Keypoint>& frame : clip.keypoints->frames) {
-    for (Keypoint& point : frame) {
-      const Vector2<double> place = straight_of(
-          lens, {(point.x * camera.width - camera.cx) / camera.fx, (point.y * camera.height - camera.cy) / camera.fy});
-      point.x = (place[0] * camera.fx + camera.cx) / camera.width;
-      point.y = (place[1] * camera.fy + camera.cy) / camera.height;
-    }
-  }
+  if (clip.keypoints) straighten(lens, clip.camera, *clip.keypoints);
 }
 
 bool fits_camera(const Image& frame, const Camera& camera) {

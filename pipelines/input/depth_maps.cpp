@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/npz.h"
 #include "core/parallel.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/input/clip.h"
 
@@ -105,8 +106,7 @@ void check_shape(const Image& map, const Camera& camera, const std::string& name
                down = static_cast<double>(map.height()) / camera.height;
   const double least = std::min({map.width(), map.height(), camera.width, camera.height});
   if (std::abs(across / down - 1) <= 1 / least) return;
-  throw DataError(name + ": is " + std::to_string(map.width()) + "x" + std::to_string(map.height()) +
-                  " pixels, the camera's image " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+  throw DataError(name + ": is " + size_text(map) + " pixels, the camera's image " + size_text(camera) +
                   "; allowed: any size of its shape");
 }
 

@@ -5,6 +5,7 @@
 #include "core/config_file.h"
 #include "core/image_io.h"
 #include "core/mask_image.h"
+#include "core/size_text.h"
 #include "pipelines/input/body_files.h"
 
 namespace hsi4d {
@@ -54,8 +55,7 @@ void check_numbers(const ViewSet& set) {
 /// The image, unless it has another size than its camera.
 Image sized(Image image, const fs::path& file, const Camera& camera) {
   if (image.width() == camera.width && image.height() == camera.height) return image;
-  throw DataError(file.string() + ": is " + std::to_string(image.width()) + "x" + std::to_string(image.height()) +
-                  " pixels; its camera has " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
+  throw DataError(file.string() + ": is " + size_text(image) + " pixels; its camera has " + size_text(camera));
 }
 
 ViewImage image_of_frame(const ClipVideo& video, const PosedView& view, const Camera& camera) {

@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/mask_image.h"
+#include "core/size_text.h"
 #include "core/video.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/input/frame_source.h"
@@ -74,9 +75,8 @@ void leave_out_masks(const fs::path& folder, FirstPicture& picture) {
     Image mask = read_mask_of(entry, picture.name);
     if (mask.empty()) continue;
     if (mask.height() != height || mask.width() != width)
-      throw DataError(entry.string() + ": its mask is " + std::to_string(mask.width()) + "x" +
-                      std::to_string(mask.height()) + " pixels, the frame " + std::to_string(width) + "x" +
-                      std::to_string(height));
+      throw DataError(entry.string() + ": its mask is " + size_text(mask) + " pixels, the frame " +
+                      size_text(width, height));
     masks.object_masks.push_back(std::move(mask));
   }
   if (masks.object_masks.empty())

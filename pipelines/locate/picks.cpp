@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/check.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/draw/median_depth.h"
 
@@ -64,7 +65,7 @@ bool is_in(const Vector2<double>& pixel, const Camera& camera) {
 
 std::string outside(const Vector2<double>& pixel, const char* what, const Camera& camera) {
   return number_text(pixel[0]) + "," + number_text(pixel[1]) + " is outside of the " + what + ", which has " +
-         std::to_string(camera.width) + "x" + std::to_string(camera.height) + " pixels";
+         size_text(camera) + " pixels";
 }
 
 }  // namespace

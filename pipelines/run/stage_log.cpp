@@ -5,6 +5,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "optim/metrics.h"
+#include "pipelines/config/run_problems.h"
 #include "pipelines/draw/view_turn.h"
 
 namespace hsi4d {
@@ -142,9 +143,11 @@ void warn_of_still_joints(const Clip& clip, const std::vector<SceneState>& befor
               " mm on average, next to nothing: the weights or the learning rates leave the body where it was");
 }
 
-void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings) {
+void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings,
+                       bool has_objects) {
   for (const std::string& term : off) {
     const LossSettings* const term_settings = find_entry(settings.losses, term);
+    if (!has_objects && term_settings != nullptr && is_of_objects(*term_settings)) continue;
     log_warning("stage " + stage + ": the loss \"" + term + "\" is off: " +
                 (term_settings != nullptr && term_settings->weight == 0 ? "its weight is 0" : "it lacks an input"));
   }

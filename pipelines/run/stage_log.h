@@ -50,7 +50,9 @@ void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& s
 void warn_of_still_joints(const Clip& clip, const std::vector<SceneState>& before, const std::vector<SceneState>& after,
                           const std::string& stage);
 
-/// Every term of a stage that is off: one warning, with the reason.
-void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings);
+/// Every term of a stage that is off: one warning, with the reason. Where there are no objects, nothing of terms that
+/// mean nothing then (is_of_objects).
+void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings,
+                       bool has_objects);
 
 }  // namespace hsi4d

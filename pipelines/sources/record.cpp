@@ -215,12 +215,23 @@ SourceOutput motion_output(const RunConfig& config, const DataSettings& data) {
   return output_of(config, "motion", command, record, ".npz");
 }
 
+/// What a state of frame 0 shows, as the video's lens sees it.
+void add_first_masks(const RunConfig& config, const char* key, ConfigValue& record) {
+  record.add(key, first_frame_record(config));
+  const Lens& lens = config.data.lens.lens;
+  if (lens.is_straight()) return;
+  ConfigValue numbers = ConfigValue::make_array();
+  for (const double number : {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2})
+    numbers.items.push_back(ConfigValue::make_number(number));
+  record.add("lens", std::move(numbers));
+}
+
 SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
   const std::vector<std::string>& command = config.sources.masks.command;
   ConfigValue record = command_record(config, command);
   record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
   record.add("masks_of", strings(masked_names(data)));
-  if (uses_placeholder(command, "first_masks")) record.add("first_masks", first_frame_record(config));
+  if (uses_placeholder(command, "first_masks")) add_first_masks(config, "first_masks", record);
   const SourceOutput output = output_of(config, "masks", command, record, "");
   if (output.is_there) check_cached_masks(data, output.path);
   return output;
@@ -241,7 +252,7 @@ SourceOutput embedded_mask_output(const RunConfig& config, const DataSettings& d
     is_rendered |= !has_hint(object);
   }
   record.add("first", std::move(first));
-  if (is_rendered) record.add("first_frame", first_frame_record(config));
+  if (is_rendered) add_first_masks(config, "first_frame", record);
   return output_of(config, "masks", {}, record, "");
 }
 

@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/process.h"
 #include "core/progress.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/config/masks.h"
 #include "pipelines/draw/camera_selection.h"
@@ -49,11 +50,20 @@ void paint(Gaussians& gaussians, Index begin, Index end) {
     std::fill_n(gaussians.sh.begin() + 3 * i, 3, i >= begin && i < end ? white : -white);
 }
 
-// ---- What was made ----
-
-std::string size_text(const Image& image) {
-  return std::to_string(image.width()) + "x" + std::to_string(image.height());
+/// A mask of a pinhole as the lens would have taken it; 0 where it does not reach.
+Image bent_mask(const Image& mask, const Camera& camera, const Lens& lens) {
+  Image bent(1, mask.height(), mask.width());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      const Vector2<double> at =
+          straight_of(lens, {(x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy});
+      bent(0, y, x) = sample(mask, 0, camera.fy * at[1] + camera.cy - 0.5, camera.fx * at[0] + camera.cx - 0.5);
+    }
+  }
+  return bent;
 }
+
+// ---- What was made ----
 
 void check_video(const RunConfig& config, const fs::path& path) {
   DataSettings data = config.data;
@@ -68,8 +78,7 @@ void check_video(const RunConfig& config, const fs::path& path) {
     const Image frame = frames.read(t);
     if (frame.channels() >= 3 && fits_camera(frame, camera)) continue;
     throw DataError("frame " + std::to_string(frames.number(t)) + " is " + size_text(frame) + " with " +
-                    std::to_string(frame.channels()) + " channels; the camera's image is " +
-                    std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                    std::to_string(frame.channels()) + " channels; the camera's image is " + size_text(camera) +
                     " with 3, and a video is as large, or larger and of its shape");
   }
 }
@@ -533,6 +542,7 @@ Image first_frame_image(const RunConfig& config) {
 
 std::vector<Image> first_masks(const RunConfig& config) {
   const SceneSetup setup = read_scene_setup(config.data);
+  const Lens& lens = config.data.lens.lens;
   SceneView view = first_view(config);
   view.background = {0, 0, 0};
   PosedGaussians all = first_frame(setup, camera_center_world(view.camera)).all;
@@ -542,7 +552,8 @@ std::vector<Image> first_masks(const RunConfig& config) {
   std::vector<Image> masks;
   for (std::size_t part = 1; part < ends.size(); ++part) {
     paint(all.gaussians, ends[part - 1], ends[part]);
-    masks.push_back(take_channels(render_picture(all, view).image, 0, 1));
+    const Image mask = take_channels(render_picture(all, view).image, 0, 1);
+    masks.push_back(lens.is_straight() ? mask : bent_mask(mask, view.camera, lens));
   }
   std::rotate(masks.begin(), masks.end() - 1, masks.end());  // the human first
   return masks;

@@ -59,7 +59,8 @@ DataSettings make_sources(const RunConfig& config, const MotionMaker& make_motio
 /// @param retry  1 before it is run for the second time
 double seconds_before_retry(const ProgramSettings& settings, int retry);
 
-/// Coverage of the human and then of each object in I_0, what hides them taken away, [1,H,W] each.
+/// Coverage of the human and then of each object in I_0, what hides them taken away, [1,H,W] each; as data.lens shows
+/// it.
 std::vector<Image> first_masks(const RunConfig& config);
 
 /// I_0: everything in the state of frame 0, as the camera of frame 0 sees it, [3,H,W] clamped to [0, 1].  [method.md,

@@ -261,8 +261,8 @@ TEST_CASE("depth_map compares with a map after the least squares of scale and sh
   for (const bool is_disparity : {false, true}) {
     const MappedDepths& given = is_disparity ? turned : depths;
     const auto value = [&](const std::string& kernel) {
-      return given.value(R"({"scale": 0.4, "kind": ")" + std::string(is_disparity ? "disparity" : "depth") +
-                         R"(", "kernel": ")" + kernel + R"("})");
+      return given.value(R"({"kind": ")" + std::string(is_disparity ? "disparity" : "depth") + R"(", "kernel": ")" +
+                         kernel + R"(")" + (kernel == "squared" ? "" : R"(, "scale": 0.4)") + "}");
     };
     const double s = static_cast<double>(0.4F);
     CHECK(value("squared") == Approx(given.plainly(is_disparity, [](double r) { return r * r; })).epsilon(1e-6));
@@ -333,6 +333,20 @@ TEST_CASE("kernels of photometric and mask agree with their formulas") {
         Approx(0.75 * flat(0.5, geman) + 0.25 * structure));
   CHECK_THROWS_WITH(flat(0.5, R"({"kernel": "huber", "ssim_share": 1})"),
                     Catch::Contains("there is nothing that a kernel counts: ssim_share is 1"));
+  CHECK_THROWS_WITH(flat(0.5, R"({"scale": 0.2})"),
+                    Catch::Contains("does nothing with kernel \"absolute\"; allowed: "));
+  CHECK(flat(0.5, R"({"scale": 0.1, "ssim_share": 0})") == Approx(0.5));  // the default, as resolved configs have it
+}
+
+TEST_CASE("a scale that no kernel reads is refused") {
+  for (const char* const name : {"mask", "depth_map"}) {
+    INFO(name);
+    Tape<double> tape;
+    LossInputs<double> in;
+    CHECK_THROWS_WITH(record_term(name, in, R"({"kernel": "squared", "scale": 0.2})"),
+                      Catch::Contains("/scale: does nothing with kernel \"squared\"; allowed: kernel \"huber\" or "
+                                      "\"geman_mcclure\", or no scale"));
+  }
 }
 
 TEST_CASE("bone_directions does not depend on lengths, and lets go of what points the other way") {

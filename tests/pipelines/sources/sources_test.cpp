@@ -8,8 +8,10 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/camera_file.h"
 #include "core/check.h"
 #include "core/image_io.h"
+#include "core/lens.h"
 #include "optim/metrics.h"
 #include "pipelines/sources/lock.h"
 #include "tests/support/program.h"
@@ -258,6 +260,22 @@ TEST_CASE("a run makes its video and masks by programs, once for what they are m
   CHECK(Workshop::run("lost").status == 0);
   CHECK(lines_of("mask.txt").size() == 2);
   CHECK(temporaries_in("generated").empty());
+}
+
+TEST_CASE("masks of frame 0 are as the lens of the video shows it") {
+  RunConfig config = tiny_config();
+  const std::vector<Image> straight = first_masks(config);
+  config.data.lens.lens.k1 = -0.25;
+  const std::vector<Image> bent = first_masks(config);
+  const Camera camera = read_camera(config.data.camera.string());
+  REQUIRE(bent.size() == straight.size());
+  for (std::size_t i = 0; i < bent.size(); ++i) {
+    CAPTURE(i);
+    const Image back = straightened(bent[i], camera, config.data.lens.lens).image;
+    CHECK(mask_iou(back, straight[i]).value() > 0.85);
+    if (i == 0)  // the object is in the middle, where a lens hardly bends
+      CHECK(mask_iou(back, straight[i]).value() > mask_iou(bent[i], straight[i]).value() + 0.02);
+  }
 }
 
 TEST_CASE("hsi4d makes the masks of objects itself where it is told to, once", "[run]") {
