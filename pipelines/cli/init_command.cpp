@@ -27,10 +27,12 @@
 #include "pipelines/cli/text.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/config/shipped_configs.h"
+#include "pipelines/draw/plate_mark.h"
 #include "pipelines/footage/person_camera.h"
 #include "pipelines/footage/plate.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/frame_cameras.h"
+#include "pipelines/input/straight_keypoints.h"
 #include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
@@ -44,13 +46,13 @@ struct InitArguments {
   std::string scene;   ///< empty: of the video's background
   std::string avatar;  ///< empty: made
   std::string camera;  ///< empty: from the keypoints
-  std::optional<double> focal_px, camera_height, video_rate, frame_rate;
+  std::optional<double> focal_px, camera_height, lens_k1, video_rate, frame_rate;
   std::optional<int> longest_side_px, threads;
 };
 
 const std::string kInitCommand = "hsi4d init: ";
 constexpr int kLongestSide = 512;
-constexpr double kWallBehind = 1.5;      // of the farthest place of the person, from the camera
+constexpr double kWallBehind = 1.5;      // of how far the person goes from the camera
 constexpr double kNearestWall = 4;       // metres
 constexpr double kMarginOfMoving = 0.2;  // of the longer side: what such a camera may come to see
 constexpr double kLeastAgreeing = 0.5;
@@ -106,16 +108,6 @@ Vector2<double> first_place(const PersonCamera& found, const std::string& keypoi
   throw DataError(keypoints + ": the ankles are nowhere on the ground before the camera");
 }
 
-/// The largest distance of the person from the camera along the ground.
-double farthest_place(const PersonCamera& found) {
-  const Vector3<double> center = camera_center_world(found.camera);
-  double farthest = 0;
-  for (const std::optional<Vector2<double>>& at : found.places) {
-    if (at) farthest = std::max(farthest, (*at - center.head<2>()).norm());
-  }
-  return farthest;
-}
-
 ConfigValue data_section(const InitArguments& a) {
   const auto from_out = [&a](const std::string& file) {
     return ConfigValue::make_string(fs::proximate(fs::absolute(file), fs::absolute(a.out)).generic_string());
@@ -128,6 +120,11 @@ ConfigValue data_section(const InitArguments& a) {
   data.add("camera", ConfigValue::make_string("camera.json"));
   data.add("initial", ConfigValue::make_string("initial.json"));
   data.add("keypoints", from_out(a.keypoints));
+  if (a.lens_k1) {
+    ConfigValue lens = ConfigValue::make_object();
+    lens.add("k1", ConfigValue::make_number(*a.lens_k1));
+    data.add("lens", std::move(lens));
+  }
   if (a.video_rate) data.add("video_rate", ConfigValue::make_number(*a.video_rate));
   if (a.frame_rate) data.add("frame_rate", ConfigValue::make_number(*a.frame_rate));
   return data;
@@ -179,14 +176,10 @@ std::string told(const InitArguments& a, const PersonCamera& found, const Plate&
 void check_options(const InitArguments& a) {
   check_rate(a.video_rate, kInitCommand + "--video-rate");
   check_rate(a.frame_rate, kInitCommand + "--frame-rate");
-  const auto check_range = [](const auto& value, const char* option, double least, double most) {
-    if (value && !(*value >= least && *value <= most))
-      throw UserError(kInitCommand + option + ": " + number_text(static_cast<double>(*value)) +
-                      " is out of range; allowed: " + number_text(least) + " to " + number_text(most));
-  };
-  check_range(a.focal_px, "--focal-px", 1, 1e6);
-  check_range(a.camera_height, "--camera-height", 0.1, 100);
-  check_range(a.longest_side_px, "--longest-side-px", 64, 4096);
+  check_range(a.focal_px, kInitCommand + "--focal-px", 1, 1e6);
+  check_range(a.camera_height, kInitCommand + "--camera-height", 0.1, 100);
+  check_range(a.lens_k1, kInitCommand + "--lens-k1", -10, 10);
+  check_range(a.longest_side_px, kInitCommand + "--longest-side-px", 64, 4096);
   if (!a.camera.empty() && (a.focal_px || a.camera_height))
     throw UserError(kInitCommand +
                     "--camera says the focal length and the height; leave out --focal-px and --camera-height");
@@ -198,10 +191,10 @@ void check_options(const InitArguments& a) {
 /// Writes the background, and a scene of it.
 void write_plate(const Plate& plate, const PersonCamera& found, const RenderSettings& render,
                  const FolderInMaking& out) {
-  const PlateScene walls{.wall_distance = std::max(kNearestWall, kWallBehind * farthest_place(found)),
+  const PlateScene walls{.wall_distance = std::max(kNearestWall, kWallBehind * far_distance(found)),
                          .margin = plate.is_still ? 0 : kMarginOfMoving};
   write_image(out.file("plate.png"), plate.image);
-  write_splats(out.file("scene.ply"), scene_of_plate(plate.image, found.camera, walls, render));
+  write_plate_splats(out.file("scene.ply"), scene_of_plate(plate.image, found.camera, walls, render));
 }
 
 /// Writes the dataset. Returns what the command prints.
@@ -210,12 +203,15 @@ void write_plate(const Plate& plate, const PersonCamera& found, const RenderSett
 std::string write_footage(const InitArguments& a, const std::vector<LossDescription>& losses) {
   FolderInMaking out(a.out);
   const DataSettings data = data_of(a);
-  const ClipVideo video = open_video(data, {});
-  const Keypoints keypoints = read_keypoints(data, video.frames);
+  ClipVideo video = open_video(data, {});
+  Keypoints keypoints = read_keypoints(data, video.frames);
   const Avatar avatar =
       a.avatar.empty() ? surface_avatar(procedural_body(), AvatarOptions().settings) : read_person(a.avatar);
   const RunConfig shipped = shipped_config(losses);
   const Camera images = camera_of_images(a, video.frames);
+  video.lens = {.k1 = a.lens_k1.value_or(0)};
+  video.camera = images;
+  straighten(video.lens, images, keypoints);
   if (!a.scene.empty()) read_drawn(a.scene, shipped.render);  // a wrong file is refused before the work
   const Plate plate = plate_of(video, images);
   const PersonCamera found = look_for_person(a, keypoints, avatar, images, plate.is_still);
@@ -261,6 +257,7 @@ void add_init(CLI::App& app, Program& program) {
       ->type_name("M");
   command.add_option("--focal-px", a.focal_px, "Focal length, pixels of the video; default: its diagonal")
       ->type_name("F");
+  command.add_option("--lens-k1", a.lens_k1, "Radial bend of the lens, as data.lens.k1; default: 0")->type_name("K");
   command.add_option("--video-rate", a.video_rate, "Frames a second of the video; needed of a folder")->type_name("HZ");
   command.add_option("--frame-rate", a.frame_rate, "Frames a second that are kept; default: all")->type_name("HZ");
   command

@@ -146,16 +146,11 @@ void check_options(const LocateArguments& a) {
   needs(!a.alignment.empty(), "--alignment", !a.colmap.empty(), "--colmap");
   needs(a.focal_px.has_value(), "--focal-px", !a.picks.empty() || is_place, "--picks or --position");
   needs(a.fov_deg.has_value(), "--fov", !a.picks.empty() || is_place, "--picks or --position");
-  const auto check_range = [](const auto& value, const char* option, double least, double most) {
-    if (value && !(*value >= least && *value <= most))
-      throw UserError(kLocateCommand + option + ": " + number_text(static_cast<double>(*value)) +
-                      " is out of range; allowed: " + number_text(least) + " to " + number_text(most));
-  };
-  check_range(a.focal_px, "--focal-px", 1, 1e6);
-  check_range(a.fov_deg, "--fov", 1, 170);
-  check_range(a.tolerance_px, "--tolerance-px", 0.1, 1000);
-  check_range(a.starts, "--starts", 1, 100000);
-  check_range(a.longest_side_px, "--longest-side-px", 64, 4096);
+  check_range(a.focal_px, kLocateCommand + "--focal-px", 1, 1e6);
+  check_range(a.fov_deg, kLocateCommand + "--fov", 1, 170);
+  check_range(a.tolerance_px, kLocateCommand + "--tolerance-px", 0.1, 1000);
+  check_range(a.starts, kLocateCommand + "--starts", 1, 100000);
+  check_range(a.longest_side_px, kLocateCommand + "--longest-side-px", 64, 4096);
   check_ending(a.out, kLocateCommand + "--out", {".json"});
 }
 

@@ -39,12 +39,6 @@ struct MeshArguments {
 const std::string kMeshCommand = "hsi4d mesh: ";
 constexpr double kDistanceReach = 8;  // voxels of the level set on either side
 
-void check_range(double value, double low, double high, const std::string& option) {
-  if (value >= low && value <= high) return;
-  throw UserError(kMeshCommand + option + ": " + short_number(value) + "; allowed: " + short_number(low) + " to " +
-                  short_number(high));
-}
-
 SurfaceSettings settings_of(const MeshArguments& a) {
   SurfaceSettings settings;
   settings.is_object = a.is_object;
@@ -52,16 +46,16 @@ SurfaceSettings settings_of(const MeshArguments& a) {
   if (!a.is_object && a.cameras.empty())
     throw UserError(kMeshCommand + "where is free space? --cameras of the pictures of a scene tell it, or --object");
   settings.voxel = a.voxel;
-  if (a.voxel) check_range(*a.voxel, 1e-5, 10, "--voxel");
-  if (a.occupancy_voxel) check_range(*a.occupancy_voxel, 1e-4, 10, "--occupancy-voxel");
-  check_range(a.adaptivity, 0, 1, "--adaptivity");
+  check_range(a.voxel, kMeshCommand + "--voxel", 1e-5, 10);
+  check_range(a.occupancy_voxel, kMeshCommand + "--occupancy-voxel", 1e-4, 10);
+  check_range(a.adaptivity, kMeshCommand + "--adaptivity", 0, 1);
   if (!a.box.empty()) {
     const std::vector<double> numbers = parse_numbers(a.box, 6, kMeshCommand + "--box", "x,y,z,x,y,z");
     std::copy_n(numbers.begin(), 6, settings.box.emplace().begin());
   }
   settings.more_views = a.more_views.value_or(static_cast<int>(settings.more_views));
   settings.size_px = a.size_px.value_or(settings.size_px);
-  check_range(settings.size_px, 16, 8192, "--size");
+  check_range(settings.size_px, kMeshCommand + "--size", 16, 8192);
   settings.smallest = a.smallest.value_or(static_cast<int>(settings.smallest));
   if (a.is_object && settings.cameras.empty() && settings.more_views < 4)
     throw UserError(kMeshCommand + "--views: an object needs 4 and more, or --cameras");

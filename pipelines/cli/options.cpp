@@ -4,7 +4,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/check.h"
 #include "core/config_value.h"
+#include "core/text.h"
 
 namespace hsi4d::cli {
 
@@ -20,6 +22,12 @@ CLI::Validator whole_number(std::int64_t most) {
                (is_open ? "or more" : "to " + std::to_string(most));
       },
       "");
+}
+
+void check_range(double value, const std::string& option, double least, double most) {
+  if (value >= least && value <= most) return;
+  throw UserError(option + ": " + short_number(value) + " is out of range; allowed: " + short_number(least) + " to " +
+                  short_number(most));
 }
 
 void add_threads(CLI::App& command, std::optional<int>& threads) {

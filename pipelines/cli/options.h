@@ -24,6 +24,16 @@ void add_threads(CLI::App& command, std::optional<int>& threads);
 /// --set, several times.
 void add_overrides(CLI::App& command, std::vector<std::string>& overrides);
 
+/// Throws UserError for a number of an option that is outside.
+/// @param option  with the command, "hsi4d init: --focal-px"
+void check_range(double value, const std::string& option, double least, double most);
+
+/// The same where it is given.
+template <class T>
+void check_range(const std::optional<T>& value, const std::string& option, double least, double most) {
+  if (value) check_range(static_cast<double>(*value), option, least, most);
+}
+
 /// An option that may be given several times, with one value each time.
 CLI::Option* add_several(CLI::App& command, const std::string& name, std::vector<std::string>& values,
                          const std::string& description);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "core/mask_image.h"
 #include "pipelines/draw/report_images.h"
 
 namespace hsi4d {
@@ -29,6 +30,18 @@ void add_covered(const Image& mask, double threshold, int margin, Image& covered
 void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered) {
   add_covered(frame.human_mask, data.mask_threshold, data.mask_margin_px, covered);
   for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
+}
+
+Image background_of(const ClipFrame& frame) {
+  const int width = frame.target.width(), height = frame.target.height();
+  DataSettings wide;
+  wide.mask_threshold = 0.1;
+  wide.mask_margin_px = std::max(width, height) / 64;
+  Image covered(1, height, width);
+  add_covered(frame, wide, covered);
+  Image background = complement(covered);
+  hide_unseen(frame, background);
+  return background;
 }
 
 Image foreground_of(const ClipFrame& frame) {

@@ -12,6 +12,10 @@ namespace hsi4d {
 /// sides, are set in `covered` [1,H,W].
 void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered);
 
+/// 1 where the frame shows the background, else 0, as it does beyond a lens: away from all masks, which count from 0.1
+/// on and are grown by 1/64 of the longer side, as mattes end before shadows and hair do.
+Image background_of(const ClipFrame& frame);
+
 /// The larger of all masks of the frame, pixel by pixel.
 Image foreground_of(const ClipFrame& frame);
 

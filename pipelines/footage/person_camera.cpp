@@ -234,6 +234,17 @@ PersonOnGround person_on_ground(const Keypoints& keypoints, const Avatar& avatar
 
 }  // namespace
 
+double far_distance(const PersonCamera& found) {
+  const Vector2<double> center = camera_center_world(found.camera).head<2>();
+  std::vector<double> distances;
+  for (const std::optional<Vector2<double>>& at : found.places) {
+    if (at) distances.push_back((*at - center).norm());
+  }
+  if (distances.empty()) return 0;
+  std::sort(distances.begin(), distances.end());
+  return distances[(distances.size() - 1) * 9 / 10];
+}
+
 double usual_focal_length(int width, int height) { return std::hypot(width, height); }
 
 PersonCamera camera_of_person(const Keypoints& keypoints, const Avatar& avatar, const Camera& intrinsics,

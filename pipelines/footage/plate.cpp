@@ -10,7 +10,6 @@
 #include <Eigen/Geometry>
 
 #include "core/check.h"
-#include "core/mask_image.h"
 #include "core/parallel.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/image_of_scene.h"
@@ -21,29 +20,23 @@ namespace hsi4d {
 namespace {
 
 constexpr Index kMostFrames = 48;
-constexpr double kCoveredFrom = 0.1;  // of a mask
-constexpr int kMarginShare = 64;      // of the longer side
 constexpr double kMostUnrest = 0.5;   // pixels
 constexpr double kLeastSlope = 0.04;  // of an edge, a pixel
 
 // ---- The median ----
 
 struct PlateFrame {
-  Image image;    // [3,H,W]
-  Image covered;  // [1,H,W], 1 where a mask is
+  Image image;  // [3,H,W]
+  Image shown;  // [1,H,W], 1 where it is the background's
 };
 
 std::vector<PlateFrame> read_plate_frames(const ClipVideo& video, const Camera& size) {
-  DataSettings covering;
-  covering.mask_threshold = kCoveredFrom;
-  covering.mask_margin_px = std::max(size.width, size.height) / kMarginShare;
   const Index all = video.frames.count(), count = std::min(all, kMostFrames);
   std::vector<PlateFrame> frames;
   for (Index i = 0; i < count; ++i) {
     ClipFrame read = read_frame(video, size, i * all / count);
-    Image covered(1, size.height, size.width);
-    add_covered(read, covering, covered);
-    frames.push_back({std::move(read.target), std::move(covered)});
+    Image shown = background_of(read);
+    frames.push_back({std::move(read.target), std::move(shown)});
   }
   return frames;
 }
@@ -64,7 +57,7 @@ void take_medians(const std::vector<PlateFrame>& frames, Image& plate, Image& se
         for (int c = 0; c < 3; ++c) {
           values.clear();
           for (const PlateFrame& frame : frames) {
-            if (frame.covered(0, y, x) == 0) values.push_back(frame.image(c, y, x));
+            if (frame.shown(0, y, x) != 0) values.push_back(frame.image(c, y, x));
           }
           if (values.empty()) break;
           plate(c, y, x) = median(values);
@@ -121,7 +114,7 @@ std::optional<float> unrest_of(const PlateFrame& frame, const Image& plate, cons
   std::vector<float> distances;
   for (int y = 1; y + 1 < plate.height(); ++y) {
     for (int x = 1; x + 1 < plate.width(); ++x) {
-      if (frame.covered(0, y, x) != 0 || seen(0, y, x) == 0) continue;
+      if (frame.shown(0, y, x) == 0 || seen(0, y, x) == 0) continue;
       const double slope =
           std::hypot(grey(image, y, x + 1) - grey(image, y, x - 1), grey(image, y + 1, x) - grey(image, y - 1, x)) / 2;
       if (slope < kLeastSlope) continue;
@@ -272,7 +265,7 @@ Plate plate_of(const ClipVideo& video, const Camera& size) {
   plate.unrest_px = unrest_of(frames, plate.image, seen);
   plate.is_still = plate.unrest_px <= kMostUnrest;
   if (!plate.is_still) {
-    seen = complement(frames.front().covered);
+    seen = frames.front().shown;
     plate.image = std::move(frames.front().image);
   }
   Index count = 0;

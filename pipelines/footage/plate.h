@@ -20,8 +20,8 @@ struct Plate {
 };
 
 /// The median over frames, pixel by pixel and colour by colour, of those that no mask covers; at most 48 frames, evenly
-/// chosen, which are in memory together. Masks count from 0.1 on and are grown by 1/64 of the longer side, as mattes
-/// end before shadows and hair do. What is covered in all frames is filled from what is around it.
+/// chosen, which are in memory together. Where that is, background_of says. What is covered in all frames is filled
+/// from what is around it.
 ///
 /// @param size  of the result; frames are reduced to it
 /// Throws DataError where every pixel is covered, and as read_frame.

@@ -15,10 +15,12 @@ struct Threshold {
   double pass, check;
 };
 
-constexpr std::array<Threshold, 5> kThresholds = {{
+constexpr std::array<Threshold, 7> kThresholds = {{
     {"silhouette_iou", 0.85, 0.7},
     {"keypoints_pck", 0.9, 0.7},
     {"psnr_background_db", 24, 18},
+    {"camera_drift_px", 1, 3},
+    {"background_change", 0.02, 0.1},
     {"floor_drift_mm", 30, 100},
     {"foot_sliding_mm", 10, 25},
 }};

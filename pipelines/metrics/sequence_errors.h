@@ -30,8 +30,9 @@ struct FrameState {
 MetricValues frame_errors(const FrameState& estimate, const FrameState& truth, const ObjectPoints* points = nullptr);
 
 /// Metrics of a frame's images, in order.
-inline constexpr std::array<const char*, 5> kImageMetrics = {"psnr_db", "psnr_foreground_db", "psnr_background_db",
-                                                             "ssim", "silhouette_iou"};
+inline constexpr std::array<const char*, 7> kImageMetrics = {
+    "psnr_db",         "psnr_foreground_db", "psnr_background_db", "ssim",
+    "camera_drift_px", "background_change",  "silhouette_iou"};
 
 /// psnr_db, ssim, and psnr_foreground_db and psnr_background_db where a foreground is given that leaves something to
 /// each.

@@ -192,6 +192,7 @@ std::string summary_json(const RunSummary& summary) {
   tree.add("frames", ConfigValue::make_integer(summary.frames));
   add_number(tree, "", "seconds", summary.seconds);
   tree.add("truth", ConfigValue::make_boolean(summary.has_truth));
+  if (summary.is_on_plate) tree.add("plate", ConfigValue::make_boolean(true));
   if (!summary.surface.empty()) tree.add("surface", ConfigValue::make_string(summary.surface));
   ConfigValue stages = ConfigValue::make_array();
   for (size_t i = 0; i < summary.metrics.size(); ++i)
@@ -232,6 +233,10 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
   if (const ConfigValue* const truth = find_member(tree, "truth")) {  // version 0.1 does not say
     check_kind(*truth, Kind::kBoolean, "/truth");
     summary.has_truth = truth->boolean;
+  }
+  if (const ConfigValue* const plate = find_member(tree, "plate")) {
+    check_kind(*plate, Kind::kBoolean, "/plate");
+    summary.is_on_plate = plate->boolean;
   }
   summary.surface = string_member(tree, "surface");
   if (const ConfigValue* const stages = find_member(tree, "metrics")) {

@@ -57,6 +57,7 @@ struct RunSummary {
   int frames = 0;
   double seconds = 0;
   bool has_truth = true;              ///< false: errors of body, objects and camera could not be measured
+  bool is_on_plate = false;           ///< the scene is a background plate (pipelines/draw/plate_mark.h)
   std::string surface;                ///< the mesh by which penetration was measured; empty: it was not
   std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
   StartSummary start;
@@ -68,14 +69,14 @@ struct RunSummary {
 
 /// The text of summary.json:
 ///
-///   {"name", "frames", "seconds", "truth": BOOL, "surface",
+///   {"name", "frames", "seconds", "truth": BOOL, "plate": true, "surface",
 ///    "metrics": [{"stage", "frame"?, "seconds", "iterations", NAME: NUMBER...,
 ///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
 ///    "start": {"seconds", PART: {START: FRAMES...}...}, "found": {NAME: NUMBER...},
 ///    "quality": {NAME: {"value", "word", "pass", "check"}...},
 ///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
-///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start", "found",
-///    "quality" and "gradient_shares" only where there are any)
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "plate", "surface", "start",
+///    "found", "quality" and "gradient_shares" only where there are any)
 ///
 /// with "frame": 0 where errors are those of frame 0 alone.
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and

@@ -8,6 +8,7 @@
 #include "core/config_value.h"
 #include "core/json_text.h"
 #include "core/progress.h"
+#include "pipelines/draw/plate_mark.h"
 #include "pipelines/record/folder.h"
 
 namespace hsi4d {
@@ -95,6 +96,7 @@ void read_summary_file(const RunPaths& paths, ReportData& data) {
   if (data.summary->baselines.empty())
     data.notes.emplace_back("summary.json has no baselines: the result is shown without its start.");
   if (!data.summary->name.empty()) data.name = data.summary->name;
+  if (data.summary->is_on_plate) data.facts.emplace_back("scene", kPlateText);
   data.facts.emplace_back("frames", std::to_string(data.summary->frames));
   data.facts.emplace_back("time", duration_text(data.summary->seconds));
 }

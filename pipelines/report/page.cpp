@@ -100,14 +100,26 @@ std::string worse_message(const RunSummary& summary, const MetricValues& baselin
   return worse.empty() ? "" : "<p class=\"message\">Worse than " + name + ": " + html_escape(worse) + ".</p>\n";
 }
 
-/// Against both baselines. What stands still does not tremble, slide or drift: of copy_frame_0 that is no merit.
+/// Whether a baseline is one pose in all frames, as the start is where only frame 0 is given.
+bool stands_still(const MetricValues& baseline) {
+  const auto is_none = [&](const char* name) {
+    const double* const value = find_metric(baseline, name);
+    return value == nullptr || *value == 0;
+  };
+  return is_none("jitter") && is_none("floor_drift_mm") && is_none("foot_sliding_mm");
+}
+
+/// Against both baselines. What stands still does not tremble, slide or drift: that is no merit.
 std::string worse_messages(const RunSummary& summary) {
-  const MetricValues *const start = baseline_values(summary, "start"), *const copy =
-                                                                           baseline_values(summary, "copy_frame_0");
-  return (start == nullptr ? "" : worse_message(summary, *start, "the start")) +
-         (copy == nullptr
-              ? ""
-              : worse_message(summary, *copy, "frame 0 copied", {"jitter", "floor_drift_mm", "foot_sliding_mm"}));
+  std::string text;
+  for (const auto& [name, shown] : {std::pair("start", "the start"), {"copy_frame_0", "frame 0 copied"}}) {
+    const MetricValues* const baseline = baseline_values(summary, name);
+    if (baseline == nullptr) continue;
+    text += stands_still(*baseline)
+                ? worse_message(summary, *baseline, shown, {"jitter", "floor_drift_mm", "foot_sliding_mm"})
+                : worse_message(summary, *baseline, shown);
+  }
+  return text;
 }
 
 /// The few numbers that a reader wants first: of the last stage, against the start.

@@ -21,6 +21,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/input_hashes.h"
+#include "pipelines/metrics/background_errors.h"
 #include "pipelines/metrics/sequence_errors.h"
 #include "pipelines/record/results.h"
 #include "pipelines/record/run_events.h"
@@ -501,9 +502,23 @@ class Reconstruction {
     }
   }
 
+  /// 1 where neither masks nor the drawn human are.
+  static Image background_beside(const StatePicture& picture, const ClipFrame& frame) {
+    constexpr float kHardlyHuman = 0.02F;
+    Image background = background_of(frame);
+    for (int y = 0; y < background.height(); ++y) {
+      for (int x = 0; x < background.width(); ++x) {
+        if (picture.silhouette(0, y, x) > kHardlyHuman) background(0, y, x) = 0;
+      }
+    }
+    return background;
+  }
+
   static MetricValues picture_errors(const StatePicture& picture, const ClipFrame& frame) {
     const Image foreground = foreground_of(frame);
     MetricValues errors = image_errors(picture.image, frame.target, &foreground);
+    const MetricValues background = background_errors(picture.image, frame.target, background_beside(picture, frame));
+    errors.insert(errors.end(), background.begin(), background.end());
     const std::optional<double> iou = mask_iou(picture.silhouette, frame.human_mask);
     if (iou) errors.emplace_back("silhouette_iou", *iou);
     return errors;

@@ -14,6 +14,7 @@
 #include "core/version.h"
 #include "pipelines/config/parameter_groups.h"
 #include "pipelines/config/run_problems.h"
+#include "pipelines/draw/plate_mark.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/report/report.h"
@@ -242,6 +243,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   RunFolder folder(options.folder, identity, options.resume);
   folder.note(opening(config, clip, identity));
   early.move_to(folder);
+  if (is_plate_file(config.data.scene)) folder.note(std::string("the scene is ") + kPlateText);
   if (!lens.empty()) folder.note(lens);
   if (!blur.empty()) folder.note(blur);
   return reconstruct_into(folder, config, clip, losses, options);

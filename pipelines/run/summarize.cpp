@@ -5,6 +5,7 @@
 #include "body/kinematics.h"
 #include "core/file.h"
 #include "core/rotation.h"
+#include "pipelines/draw/plate_mark.h"
 #include "pipelines/metrics/contact_metrics.h"
 #include "pipelines/metrics/keypoint_errors.h"
 #include "pipelines/metrics/penetration.h"
@@ -260,6 +261,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   summary.frames = static_cast<int>(clip.frames());
   summary.seconds = progress.seconds + refinement.seconds;
   summary.has_truth = clip.truth.has_value();
+  summary.is_on_plate = is_plate_file(config.data.scene);
   summary.found = unknowns_by_name(progress.unknowns, clip);
   summary.start = summarize_start(progress.start);
   const ObjectPoints points(objects_of(clip));

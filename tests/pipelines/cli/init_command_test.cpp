@@ -7,6 +7,7 @@
 #include "body/kinematics.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
+#include "core/lens.h"
 #include "core/process.h"
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
@@ -20,8 +21,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Writes what a perfect detector would find in the tiny dataset.
-void write_keypoints(const std::string& file) {
+/// Writes what a perfect detector would find in the tiny dataset, filmed through a lens.
+void write_keypoints(const std::string& file, const Lens& lens = {}) {
   const Clip clip = read_clip(tiny_config().data);
   nlohmann::json joints = nlohmann::json::array(), frames = nlohmann::json::array();
   for (Index j = 0; j < 22; ++j) joints.push_back(smplx_joint_names()[static_cast<std::size_t>(j)]);
@@ -31,7 +32,8 @@ void write_keypoints(const std::string& file) {
     for (Index j = 0; j < 22; ++j) {
       const Vector3<double> at = state.camera_from_world.rotation * Vector3<double>(places.data() + 3 * j) +
                                  state.camera_from_world.translation;
-      const Vector2<double> pixel = project_point(clip.camera, at);
+      const Vector2<double> bent = bent_by(lens, {at[0] / at[2], at[1] / at[2]});
+      const Vector2<double> pixel = project_point(clip.camera, Vector3<double>(bent[0], bent[1], 1));
       frame.push_back({pixel[0], pixel[1], 1});
     }
     frames.push_back(frame);
@@ -88,6 +90,8 @@ TEST_CASE("hsi4d init makes a dataset of a video without a scene, which runs") {
   CHECK(summary["metrics"].back()["keypoints_pck"].get<double>() >
         summary["baselines"]["start"]["keypoints_pck"].get<double>());
   CHECK(file_text("run/report.html").find("<h2>Quality</h2>") != std::string::npos);
+  CHECK(file_text("run/report.html").find("<dt>scene</dt><dd>a plate") != std::string::npos);
+  CHECK_THAT(file_text("run/log.txt"), Contains("the scene is a plate"));
 }
 
 TEST_CASE("hsi4d init makes a person where none is given, and leaves out what it cannot use") {
@@ -101,6 +105,22 @@ TEST_CASE("hsi4d init makes a person where none is given, and leaves out what it
   CHECK(stages.contains("camera") == (init.out.find(" it moves (") != std::string::npos));
   CHECK_FALSE(stages["pose"]["losses"].contains("bone_directions"));  // without landmarks
   CHECK(stages["pose"]["losses"].contains("keypoints_2d"));
+}
+
+TEST_CASE("hsi4d init takes a lens that is known") {
+  const Footage footage;
+  const double focal = read_camera((TinyDataset::folder() / "camera.json").string()).fx;
+  const auto height = [&](const char* k1, const char* out) {
+    const ProgramResult init = footage.init({"--focal-px", std::to_string(focal), "--lens-k1", k1, "--out", out});
+    CAPTURE(init.err);
+    REQUIRE(init.status == 0);
+    return camera_center_world(read_camera(std::string(out) + "/camera.json"))[2];
+  };
+  const double pinhole = height("0", "pinhole");
+  write_keypoints("keypoints.json", {.k1 = -0.3});
+  CHECK(height("-0.3", "lens") == Approx(pinhole).margin(0.02));
+  CHECK(json_of("lens/config.json")["data"]["lens"]["k1"] == -0.3);
+  CHECK(load_run_config("lens/config.json", {}, descriptions_of(loss_terms())).data.lens.lens.k1 == -0.3);
 }
 
 TEST_CASE("hsi4d init takes a camera that is known") {
@@ -228,6 +248,7 @@ TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {
   };
   CHECK_THAT(error({"--focal-px", "-3"}), Contains("hsi4d init: --focal-px: -3 is out of range; allowed: 1 to "));
   CHECK_THAT(error({"--camera-height", "0"}), Contains("--camera-height: 0 is out of range"));
+  CHECK_THAT(error({"--lens-k1", "11"}), Contains("--lens-k1: 11 is out of range; allowed: -10 to 10"));
   CHECK_THAT(error({"--longest-side-px", "8"}), Contains("--longest-side-px: 8 is out of range; allowed: 64 to 4096"));
   CHECK_THAT(error({"--frame-rate", "-1"}), Contains("--frame-rate: -1"));
   const std::string camera = (TinyDataset::folder() / "camera.json").string();

@@ -42,7 +42,8 @@ TEST_CASE("hsi4d mesh refuses what it cannot do before it begins") {
   };
   CHECK_THAT(error({"--out", "m.stl", "--object"}), Catch::Contains("a mesh ends in .obj, .ply or .glb"));
   CHECK_THAT(error({"--out", "m.ply"}), Catch::Contains("--cameras") && Catch::Contains("--object"));
-  CHECK_THAT(error({"--out", "m.ply", "--object", "--voxel", "0"}), Catch::Contains("--voxel: 0; allowed"));
+  CHECK_THAT(error({"--out", "m.ply", "--object", "--voxel", "0"}),
+             Catch::Contains("--voxel: 0 is out of range; allowed"));
   CHECK_THAT(error({"--out", "m.ply", "--object", "--box", "1,2"}), Catch::Contains("x,y,z,x,y,z"));
   CHECK_THAT(error({"--out", "m.ply", "--object", "--box", "0,0,0,0,1,1"}), Catch::Contains("there is no box"));
   CHECK_THAT(error({"--out", "m.ply", "--object", "--views", "2"}), Catch::Contains("needs 4 and more"));

@@ -73,6 +73,16 @@ Scene walking(double height, double pitch_deg, double noise_px, double bent, std
 
 }  // namespace
 
+TEST_CASE("how far somebody goes is not what one wrong frame says") {
+  PersonCamera found;
+  found.camera = camera_at(1.5, 0);
+  CHECK(far_distance(found) == 0);
+  for (int t = 0; t < 20; ++t) found.places.emplace_back(Vector2<double>(0, 3 + 0.1 * t));
+  found.places[7] = Vector2<double>(0, 58);
+  found.places.emplace_back();  // a frame without ankles
+  CHECK(far_distance(found) == Approx(4.8));
+}
+
 TEST_CASE("a camera is found from somebody who walks") {
   for (const auto& [height, pitch] : {std::pair(0.6, -5.0), {1.5, 5.0}, {1.2, 0.0}, {2.6, 25.0}}) {
     const Scene scene = walking(height, pitch, 1, 0, 3);

@@ -19,6 +19,10 @@ TEST_CASE("a gate has a word for where its value lies, both ways round") {
   CHECK(word("foot_sliding_mm", 10.1) == "check");
   CHECK(word("foot_sliding_mm", 26) == "fail");
   CHECK(word("psnr_background_db", 17) == "fail");
+  CHECK(word("camera_drift_px", 1) == "pass");
+  CHECK(word("camera_drift_px", 2) == "check");
+  CHECK(word("background_change", 0.02) == "pass");
+  CHECK(word("background_change", 0.11) == "fail");
 }
 
 TEST_CASE("metrics without a gate are passed over") {

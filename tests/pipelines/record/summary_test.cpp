@@ -19,6 +19,7 @@ RunSummary small_summary() {
   summary.name = "a \"walk\"";
   summary.frames = 2;
   summary.seconds = 12.5;
+  summary.is_on_plate = true;
   summary.metrics = {{"camera", 2, 60, {{"camera_translation_cm", 0.125}, {"tiles", 4096}}},
                      {"interaction", 10, 600, {{"mpjpe_mm", 20.04}, {"camera_translation_cm", 0.125}, {"ssim", 0.9}}}};
   summary.baselines = {{"start", {{"mpjpe_mm", 60}, {"ssim", 0.5}}, {{1, {{"mpjpe_mm", 50}}}, {2, {{"mpjpe_mm", 70}}}}},
@@ -36,6 +37,7 @@ TEST_CASE("a summary reads back as it was written") {
   const RunSummary back = parse_summary(text, "summary.json");
   CHECK(summary_json(back) == text);
   CHECK(back.name == "a \"walk\"");
+  CHECK(back.is_on_plate);
   CHECK(back.seconds == 12.5);
   REQUIRE(back.metrics.size() == 2);
   CHECK(back.metrics[0].iterations == 60);
@@ -142,6 +144,8 @@ TEST_CASE("every metric of the contract is known") {
                            "psnr_db",
                            "psnr_foreground_db",
                            "psnr_background_db",
+                           "camera_drift_px",
+                           "background_change",
                            "ssim",
                            "silhouette_iou",
                            "keypoints_px",

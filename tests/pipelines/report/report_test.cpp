@@ -230,6 +230,31 @@ TEST_CASE("a report compares with frame 0 copied too, and judges penetration by 
   CHECK_THAT(page_of(0.005, 15), Contains("Worse than the start: penetration; penetration depth.</p>"));
 }
 
+TEST_CASE("a start that stands still is not better for it, one that moves may be") {
+  const TemporaryFolder here;
+  make_run("a", "a walk");
+  RunSummary summary = summary_named("a walk");
+  summary.baselines.resize(1);
+  summary.metrics[1].values = {{"mpjpe_mm", 20}, {"foot_sliding_mm", 5}, {"jitter", 9}};
+  const auto page_with = [&](double jitter) {
+    summary.baselines[0].values = {{"mpjpe_mm", 60}, {"foot_sliding_mm", 0}, {"jitter", jitter}};
+    here.write("a/summary.json", summary_json(summary));
+    return report_html("a");
+  };
+  CHECK_THAT(page_with(0), !Contains("Worse than"));
+  CHECK_THAT(page_with(3), Contains("Worse than the start: foot sliding; jitter.</p>"));
+}
+
+TEST_CASE("a report says that the scene is a plate") {
+  const TemporaryFolder here;
+  make_run("a", "a walk");
+  RunSummary summary = summary_named("a walk");
+  CHECK_THAT(report_html("a"), !Contains("<dt>scene</dt>"));
+  summary.is_on_plate = true;
+  here.write("a/summary.json", summary_json(summary));
+  CHECK_THAT(report_html("a"), Contains("<dt>scene</dt><dd>a plate: the background of the video"));
+}
+
 TEST_CASE("the same run gives the same bytes, and reporting twice changes nothing") {
   const TemporaryFolder here;
   make_run("a", "a walk");
