@@ -20,8 +20,9 @@ class Information {
   /// Eigenvalues of the matrix with ones on its diagonal up to this are those of directions of which nothing is known:
   /// rounding in float leaves 1e-13.
   static constexpr double kLeastEigenvalue = 1e-10;
-  /// A number of which more than this share depends on such a direction is not known.
-  static constexpr double kLeastShare = 1e-5;
+  /// A number of which more than this share depends on such a direction is not known. Less is rounding: what is in
+  /// float mixes such directions with others that are hardly known.
+  static constexpr double kLeastShare = 0.01;
 
   /// @param matrix  H [n,n], symmetric and positive semi-definite to rounding; its lower triangle counts
   /// Throws InternalError where a number is not finite.

@@ -28,8 +28,8 @@
 
 namespace hsi4d {
 
-/// By how much errors are larger than the curvature says, measured: docs/numerics/accuracy.md.
-inline constexpr double kSigmaFactor = 1;
+/// By how much errors are larger than the curvature says, measured on clips: docs/numerics/accuracy.md.
+inline constexpr double kSigmaFactor = 2.5;
 
 /// At the parameters that are on the tape. It is as it was afterwards.
 ///

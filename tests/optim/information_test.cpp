@@ -74,7 +74,7 @@ TEST_CASE("what depends on a direction of which nothing is known is not known, a
   jacobian.row(1) << 1, 0, 0, 0;
   jacobian.row(2) << 0, 0, 1, 0;
   jacobian.row(3) << 0, 0, 0, 1;
-  jacobian.row(4) << 2, 2, 3, 1e-3;
+  jacobian.row(4) << 2, 2, 3, 0.2;
   const Information known(information);
   CHECK(known.unknown_directions() == 2);
   const Vector sigmas = known.sigmas(jacobian);

@@ -32,7 +32,8 @@ std::string fault(const std::string& text, const std::vector<std::string>& overr
 }
 
 const std::string kSections =
-    "name, seed, threads, precision, rotations, background, remove_depth_bias, camera, camera_selection, start, "
+    "name, seed, threads, precision, rotations, background, remove_depth_bias, uncertainty, camera, camera_selection, "
+    "start, "
     "instance, data, sources, "
     "chain, "
     "body, "

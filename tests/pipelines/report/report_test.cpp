@@ -462,8 +462,10 @@ TEST_CASE("how sure a run says that it is is shaded under its errors") {
                                       {"object_sigma_depth_cm", 2.0}})
       frame.values.emplace_back(name, value);
   }
-  RunFolder("a", {"{}\n", 3, 0, "float"}, true).write_summary(summary);
-  const std::string page = report_html("a");
+  RunFolder folder("b", {"{}\n", 0, 1, "float"}, false);
+  folder.append_metrics({1, "camera", 0, 0.5, {}, 0.001});
+  folder.write_summary(summary);
+  const std::string page = report_html("b");
   CHECK(tag_fault(page) == "");
   CHECK(count_of(page, "<polygon ") == 3);
   CHECK(count_of(page, "<title>claimed sigma</title>") == 3);

@@ -1,8 +1,9 @@
-// How sure places are: where something hides, in runs and in their files.
+// How sure places are: against differences of renders, where something hides, in runs and in their files.
 #include "pipelines/run/place_uncertainty.h"
 
 #include <cmath>
 
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 
 #include "body/motion_io.h"
@@ -55,6 +56,34 @@ void film_with_noise(double deviation, StageInputs& inputs) {
   }
 }
 
+/// What pixels say of the object's place in the axes of the camera, by differences of renders.
+Matrix3<double> information_by_differences(const StageInputs& inputs, double deviation) {
+  constexpr double kStep = 1e-3;
+  std::array<std::pair<Image, Image>, 3> images;
+  for (int axis = 0; axis < 3; ++axis) {
+    SceneState before = inputs.start, after = inputs.start;
+    const Vector3<double> step = kStep * inputs.start.camera_from_world.rotation.row(axis).transpose();
+    before.objects[0].translation -= step;
+    after.objects[0].translation += step;
+    images[static_cast<std::size_t>(axis)] = {drawn(inputs, before), drawn(inputs, after)};
+  }
+  Matrix3<double> information = Matrix3<double>::Zero();
+  const Image& size = images[0].first;
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < size.height(); ++y) {
+      for (int x = 0; x < size.width(); ++x) {
+        Vector3<double> rate;
+        for (int axis = 0; axis < 3; ++axis) {
+          const auto& [before, after] = images[static_cast<std::size_t>(axis)];
+          rate[axis] = static_cast<double>(after(c, y, x) - before(c, y, x)) / (2 * kStep);
+        }
+        information += rate * rate.transpose() / (deviation * deviation);
+      }
+    }
+  }
+  return information;
+}
+
 /// Out of the view: behind the camera.
 void take_out_of_view(SceneState& state) {
   const Matrix3<double>& axes = state.camera_from_world.rotation;
@@ -63,6 +92,18 @@ void take_out_of_view(SceneState& state) {
 }
 
 }  // namespace
+
+TEST_CASE("in depth an object is a little less sure than differences of renders say") {
+  StageInputs inputs = stage_of(tiny_config(kObjectAlone));
+  constexpr double kNoise = 0.02;
+  film_with_noise(kNoise, inputs);
+  const double found = sigmas_at_start(inputs).objects.at(0).along;
+  const double expected = kSigmaFactor * std::sqrt(information_by_differences(inputs, kNoise).inverse()(2, 2));
+  INFO(found << " against " << expected);
+  // How the sizes of the Gaussians follow their depth is left out of the curvature.
+  CHECK(found > 0.9 * expected);
+  CHECK(found < 2.5 * expected);
+}
 
 TEST_CASE("what does not move is sure, and twice the noise is half as sure") {
   StageInputs inputs = stage_of(tiny_config(kObjectAlone));
@@ -103,6 +144,18 @@ TEST_CASE("an object that something hides is less sure, and one that nothing sho
   const PlaceSigma unseen = sigmas_at_start(inputs).objects[0];
   CHECK(std::isinf(unseen.across));
   CHECK(std::isinf(unseen.along));
+}
+
+TEST_CASE("what pixels do not show priors may tell") {
+  std::vector<std::string> settings = kObjectAlone;
+  settings.push_back(R"(stages.interaction.losses={"photometric": {"ssim_share": 0}, "depth": {"weight": 0.1}})");
+  StageInputs inputs = stage_of(tiny_config(settings));
+  take_out_of_view(inputs.start);
+  film_with_noise(0.02, inputs);
+  const PlaceSigma sigma = sigmas_at_start(inputs).objects[0];
+  CHECK(std::isinf(sigma.across));
+  CHECK(sigma.along > 0);
+  CHECK(std::isfinite(sigma.along));
 }
 
 TEST_CASE("a run tells how sure places are, and moves as one that does not", "[run]") {
