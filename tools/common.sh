@@ -20,6 +20,9 @@ refuse() { fail_with 2 "$@"; }
 # The exit status where what is needed cannot be installed: later it may.
 # shellcheck disable=SC2034
 readonly not_now=75
+# The last playwright-core that runs with Debian 12's Node 18.
+# shellcheck disable=SC2034  # of tools/frontend and tools/test_report
+readonly playwright_version=1.60.0
 
 # timed TITLE COMMAND...: runs the command and prints how long it took.
 timed() {
