@@ -68,6 +68,7 @@ SourceSettings sources_of(const SourceSettings& shared, const ChainClip& clip) {
   leave_out(clip.data.masks, sources.masks);
   leave_out(clip.data.keypoints, sources.person);
   leave_out(clip.data.motion, sources.motion);
+  if (!clip.data.keypoints.empty()) sources.person.program = SourceProgram::kCommand;
   if (!clip.data.motion.empty()) sources.motion.program = SourceProgram::kCommand;
   return sources;
 }

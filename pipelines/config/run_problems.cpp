@@ -177,11 +177,11 @@ void add_command_problems(const SourceSettings& sources, std::vector<RunProblem>
   const auto add_double = [&found](const OwnSourceSettings& source, const std::string& name) {
     const std::string section = "/sources/" + name;
     if (source.is_embedded() && !source.command.empty())
-      found.push_back(
-          {section + "/command",
-           "given, and " + section + "/program is \"embedded\", which makes the " + name + " too; remove one",
-           {section}});
+      found.push_back({section + "/command",
+                       "given, and " + section + "/program is \"embedded\", which does the same; remove one",
+                       {section}});
   };
+  add_double(sources.person, "person");
   add_double(sources.masks, "masks");
   add_double(sources.motion, "motion");
 }
@@ -191,7 +191,7 @@ void add_front_end_problem(const SourceSettings& sources, std::vector<RunProblem
   if (!person_command(sources).empty()) return;
   std::vector<std::string> places;
   for (const std::filesystem::path& file : front_end_places()) places.push_back(file.string());
-  found.push_back({"/sources/motion/program",
+  found.push_back({sources.person.is_embedded() ? "/sources/person/program" : "/sources/motion/program",
                    "\"embedded\" without data.keypoints needs tools/frontend, which finds the person, and it is not "
                    "there: " +
                        joined(places) +
@@ -221,6 +221,10 @@ void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found
   if (config.sources.motion.is_embedded() && !config.data.motion.empty())
     found.push_back(
         {"/data/motion", "given, and /sources/motion makes it too; remove one", {"/data/motion", "/sources/motion"}});
+  if (config.sources.person.is_embedded() && !config.data.keypoints.empty())
+    found.push_back({"/data/keypoints",
+                     "given, and /sources/person makes it too; remove one",
+                     {"/data/keypoints", "/sources/person"}});
   if (finds_person(config.sources, config.data.keypoints)) add_front_end_problem(config.sources, found);
   if (config.sources.masks.is_embedded() && config.data.objects.empty() && !config.data.masks.empty())
     found.push_back({"/sources/masks/program",

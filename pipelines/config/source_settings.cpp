@@ -73,12 +73,13 @@ bool makes_masks(const SourceSettings& sources) {
 }
 
 bool has_sources(const SourceSettings& sources) {
-  return !sources.video.command.empty() || !sources.person.command.empty() || makes_masks(sources) ||
-         sources.motion.is_embedded() || !sources.motion.command.empty();
+  return !sources.video.command.empty() || sources.person.is_embedded() || !sources.person.command.empty() ||
+         makes_masks(sources) || sources.motion.is_embedded() || !sources.motion.command.empty();
 }
 
 bool finds_person(const SourceSettings& sources, const std::filesystem::path& keypoints) {
-  return keypoints.empty() && (!sources.person.command.empty() || sources.motion.is_embedded());
+  return keypoints.empty() &&
+         (sources.person.is_embedded() || !sources.person.command.empty() || sources.motion.is_embedded());
 }
 
 std::vector<std::filesystem::path> front_end_places() {
@@ -111,10 +112,13 @@ void describe(ConfigFields& f, SourceSettings& s) {
   f.string("prompt", s.prompt, "What happens in the video: {prompt}");
   f.object("video", s.video, "The program that makes the video of an image and a text");
   f.object(
-      "person", s.person,
-      "The program that finds the human in the video: keypoints, and masks where no other has them; without a "
-      "command tools/frontend, where motion is embedded",
-      [](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, person_placeholders()); });
+      "person", s.person, "The program that finds the human in the video: keypoints, and masks where no other has them",
+      [](ConfigFields& fields, OwnSourceSettings& person) {
+        describe_program(fields, person, person_placeholders());
+        fields.choice("program", person.program, kSourcePrograms,
+                      "Who finds him: `command`, or tools/frontend (embedded), which without a command does so for an "
+                      "embedded motion too");
+      });
   f.object("masks", s.masks, "The program that makes the masks of the video",
            [](ConfigFields& fields, OwnSourceSettings& masks) {
              describe_program(fields, masks, mask_placeholders());

@@ -69,7 +69,7 @@ struct SourceSettings {
   std::filesystem::path folder;  ///< of what was made; empty: "generated" beside the config
   std::string prompt;            ///< what happens in the video
   VideoSourceSettings video;
-  ProgramSettings person;    ///< keypoints and masks of the human in the video
+  OwnSourceSettings person;  ///< keypoints and masks of the human in the video; embedded: the front end finds them
   OwnSourceSettings masks;   ///< embedded: pipelines/follow makes those of the objects; the human's are known before
   OwnSourceSettings motion;  ///< poses of the human in the video; embedded: of its keypoints
 };

@@ -137,6 +137,7 @@ void warn_of_still_joints(const Clip& clip, const std::vector<SceneState>& befor
       sum += (Vector3<double>(to.data() + i) - Vector3<double>(from.data() + i)).norm();
     count += kMetricJoints;
   }
+  if (count == 0) return;
   const double moved_mm = 1000 * sum / static_cast<double>(count);
   if (moved_mm >= kLeastMoveMm) return;
   log_warning("stage " + stage + ": the joints have moved by " + rounded(moved_mm, 2) +

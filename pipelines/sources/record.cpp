@@ -176,10 +176,29 @@ SourceOutput video_output(const RunConfig& config) {
   return output;
 }
 
+/// The files of the front end beside its script, which calls them.
+void add_front_end(const std::vector<std::string>& command, ConfigValue& record) {
+  if (command.empty()) return;
+  const fs::path services = fs::path(command.front()).parent_path() / "services";
+  std::string lines;
+  for (const char* const name : {"blazepose.mjs", "hands.mjs", "track.mjs"})
+    lines += content_hash((services / name).string()) + " " + name + "\n";
+  record.add("front_end", ConfigValue::make_string(lines));
+}
+
+/// As the bends of a lens are recorded.
+ConfigValue lens_record(const Lens& lens) {
+  ConfigValue numbers = ConfigValue::make_array();
+  for (const double number : {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2})
+    numbers.items.push_back(ConfigValue::make_number(number));
+  return numbers;
+}
+
 SourceOutput person_output(const RunConfig& config, const DataSettings& data) {
   const std::vector<std::string> command = person_command(config.sources);
   ConfigValue record = command_record(config, command);
   record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
+  if (config.sources.person.command.empty()) add_front_end(command, record);
   return output_of(config, "person", command, record, "");
 }
 
@@ -199,6 +218,8 @@ SourceOutput embedded_motion_output(const RunConfig& config, const DataSettings&
   record.add("keypoints", ConfigValue::make_string(input_hashes(files)));
   record.add("first_frame", first_frame_record(config));
   record.add("finds_first", ConfigValue::make_boolean(finds_first_frame(config)));
+  record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
+  record.add("lens", lens_record(config.data.lens.lens));
   record.add("video_rate", ConfigValue::make_number(data.video_rate));
   record.add("frame_rate", ConfigValue::make_number(data.frame_rate));
   return output_of(config, "motion", {}, record, ".npz");
@@ -220,10 +241,7 @@ void add_first_masks(const RunConfig& config, const char* key, ConfigValue& reco
   record.add(key, first_frame_record(config));
   const Lens& lens = config.data.lens.lens;
   if (lens.is_straight()) return;
-  ConfigValue numbers = ConfigValue::make_array();
-  for (const double number : {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2})
-    numbers.items.push_back(ConfigValue::make_number(number));
-  record.add("lens", std::move(numbers));
+  record.add("lens", lens_record(lens));
 }
 
 SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
