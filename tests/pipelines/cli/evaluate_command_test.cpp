@@ -75,7 +75,7 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
     INFO(name);
     CHECK((find_metric_facts(name) == nullptr || one.contains(name)));
   }
-  CHECK(count == 26 + (one.contains("contact_distance_mm") ? 1 : 0));
+  CHECK(count == 28 + (one.contains("contact_distance_mm") ? 1 : 0));
   CHECK(one["per_frame"].size() == kTinyFrames - 1);
   CHECK(one["per_frame"][0]["frame"] == 1);
   CHECK(one["per_frame"][2]["mpjpe_mm"].get<double>() ==

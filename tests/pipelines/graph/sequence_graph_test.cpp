@@ -134,7 +134,7 @@ TEST_CASE("gradients of a sequence are right for every group and term") {
     for (Index i = 0; i < numbers.shape.count(); ++i) numbers.data[i] += 0.03 * std::sin(1.7 * static_cast<double>(i));
   }
   const std::any& defaults = term_named("contact").description.defaults;
-  Var<double> total = term_named("fit").record(inputs, {});
+  Var<double> total = term_named("fit").record(inputs, term_named("fit").description.defaults);
   total = total + term_named("smooth").record(inputs, term_named("smooth").description.defaults);
   total = total + term_named("contact").record(inputs, defaults) * 10.0;
   total = total + term_named("ground").record(inputs, term_named("ground").description.defaults);
