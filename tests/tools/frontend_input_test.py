@@ -293,11 +293,12 @@ with tempfile.TemporaryDirectory() as name:
 
     # A folder of another video or of other options is no place for this one.
     (here / "y/found").mkdir(parents=True)
-    (here / "y/made_of.txt").write_text("another video\n")
+    (here / "y/found_of.txt").write_text("video another\n")
     said = run(tools / "from_video", video, "--out", here / "y")
-    assert "was made of another video or with other options" in said and "name a new folder" in said, said
-    (here / "y/made_of.txt").unlink()
-    assert "no made_of.txt says of what" in run(tools / "from_video", video, "--out", here / "y")
+    assert "found was made of another video or with other options; then (<) and now (>): < video another > video " in said, said
+    (here / "y/found_of.txt").unlink()
+    assert "holds found, and no found_of.txt says of what; name a new folder" in run(tools / "from_video", video, "--out", here / "y")
+    assert "none.safetensors: there is no such file" in run(*from_video, "--avatar", here / "none.safetensors")
 
     # The order of the work, with a stand-in for hsi4d, on a folder in which the person is found already.
     program = here / "program/hsi4d"
@@ -311,10 +312,11 @@ with tempfile.TemporaryDirectory() as name:
     guess.write_text("{}")
     words = [str(video), "--scene", str(video), "--guess", str(guess), "--look", "kept", "--frame-rate", "5"]
     all_of_it = [tools / "from_video", *words, "--out", here / "z"]
-    made_of = "".join(f"{text}\n" + (f"{hashlib.sha256(pathlib.Path(text).read_bytes()).hexdigest()}  {text}\n" if pathlib.Path(text).exists() else "")
-                      for text in words)
+    def hashed(file):
+        return hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest()
+
     (here / "z/found/masks").mkdir(parents=True)
-    (here / "z/made_of.txt").write_text(made_of)
+    (here / "z/found_of.txt").write_text(f"video {hashed(video)}\n")
 
     # The video is looked at first, in the words of the options.
     (program.parent / "refused").write_text("hsi4d: error: gives 1 of its 1 frames\n")
@@ -334,6 +336,9 @@ with tempfile.TemporaryDirectory() as name:
     done = calls.read_text().splitlines()[4:]
     assert [line.split()[0] for line in done] == ["info", "init", "run"], done
     assert f"--camera {here}/z/camera.json --scene {video}" in done[1] and "--frame-rate 5" in done[1], done
+    # Only then do other options need another folder; their order says nothing.
+    said = run(*all_of_it, "--frame-rate", "4", env=environment)
+    assert "clip was made of" in said and "< --frame-rate 5" not in said and "> --frame-rate 4" in said, said
     # A good one needs no option.
     word.write_text("pass")
     for file in ["camera.json", "camera.txt"]:
