@@ -16,6 +16,7 @@ namespace {
 constexpr int kLookedAt = 256, kLeastSide = 24;  // pixels of the longer side, of the shorter one
 constexpr int kMostRounds = 12;                  // at each size
 constexpr double kLeastStep = 0.005;             // pixels
+constexpr double kLeastColorStep = 1e-4;         // of gain and offset
 constexpr double kSpoiled = 0.1;                 // a difference beyond which pixels hardly count
 constexpr double kNoise = 0.02, kMostUncertain = 0.1;
 constexpr double kOtherColor = 0.1;
@@ -68,8 +69,9 @@ bool is_background(const Image& background, int y, int x) { return background(0,
 
 /// u(x) by the numbers of a displacement.
 Eigen::Matrix<double, 2, 4> way_by(const Image& picture, int y, int x) {
-  const double corner = std::hypot(picture.width(), picture.height()) / 2;
-  const double right = (x - (picture.width() - 1) / 2.0) / corner, down = (y - (picture.height() - 1) / 2.0) / corner;
+  const double width = picture.width(), height = picture.height();
+  const double corner = std::sqrt(width * width + height * height) / 2;
+  const double right = (x - (width - 1) / 2) / corner, down = (y - (height - 1) / 2) / corner;
   Eigen::Matrix<double, 2, 4> by;
   by << 1, 0, right, -down, 0, 1, down, right;
   return by;
@@ -204,6 +206,7 @@ void match_exposure(Pictures& pictures) {
       const Eigen::Vector2d step = normal.ldlt().solve(right);
       gain = std::clamp(gain + step[0], 1 / kMostGain, kMostGain);
       offset += step[1];
+      if (step.norm() < kLeastColorStep) break;
     }
     for (int y = 0; y < pictures.render.height(); ++y) {
       for (int x = 0; x < pictures.render.width(); ++x)
