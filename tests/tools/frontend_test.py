@@ -123,7 +123,7 @@ with tempfile.TemporaryDirectory() as name:
     # Smoothed points are near those that were found, and rest more.
     _, said, rough = look("rough", ["-c", "copy"])
     _, said, smooth = look("smooth", ["-c", "copy"], options=["--smooth", "3"])
-    assert smooth["scores"] == rough["scores"], said
+    assert all(abs(a - b) < 0.05 for a, b in zip(smooth["scores"], rough["scores"], strict=True)), said
     moved = [math.dist(a[:2], b[:2]) for t in range(3) for a, b in zip(smooth["frames"][t], rough["frames"][t])]
     assert 0 < max(moved) < 20, max(moved)
 
