@@ -186,7 +186,7 @@ void add_front_end(const std::vector<std::string>& command, ConfigValue& record)
   record.add("front_end", ConfigValue::make_string(lines));
 }
 
-/// As the bends of a lens are recorded.
+/// The five numbers of a lens.
 ConfigValue lens_record(const Lens& lens) {
   ConfigValue numbers = ConfigValue::make_array();
   for (const double number : {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2})
