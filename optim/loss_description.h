@@ -30,6 +30,7 @@ enum class LossInput {
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points
   kObjectMotion,   ///< object_points, and motion with objects
+  kContacts,       ///< motion->contacts, with body_points and object_points: where data.contacts is given
   kBodyVertices,   ///< motion->mesh, where the avatar was made on it; on demand
   kDepths,         ///< depth_moments, transmittance, depth_target: where pictures come with depths
   kGaussians,      ///< gaussian_opacities, gaussian_log_scales: where Gaussians themselves are made

@@ -29,6 +29,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(joints) && motion;
     case LossInput::kObjectMotion:
       return object_points && motion && !motion->objects.empty();
+    case LossInput::kContacts:
+      return given(joints) && motion && motion->contacts.has_value();
     case LossInput::kBodyVertices:
       return motion && motion->mesh != nullptr;
     case LossInput::kDepths:

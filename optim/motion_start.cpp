@@ -58,7 +58,7 @@ bool is_foot_joint(Index joint) {
   return std::find(feet.begin(), feet.end(), joint) != feet.end();
 }
 
-std::vector<Index> rows_of_joints(const SparseWeights& weights, bool (*is_part)(Index joint)) {
+std::vector<Index> rows_of_joints(const SparseWeights& weights, const std::function<bool(Index joint)>& is_part) {
   std::vector<Index> rows;
   for (Index v = 0; v < weights.vertices; ++v) {
     const auto first = weights.weights.begin() + v * weights.per_vertex;

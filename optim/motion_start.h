@@ -2,10 +2,13 @@
 // (hands near an object, feet that stand), once, before the first iteration.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "body/avatar.h"
 #include "core/rigid.h"
+#include "optim/annotated_contact.h"
 #include "splat/gaussians.h"
 
 namespace hsi4d {
@@ -48,6 +51,7 @@ struct MotionStart {
   PosedJoints first_body;                                          ///< in the clip's first frame
   std::vector<PosedJoints> body;                                   ///< [F]
   std::vector<std::vector<Rigid<double>>> world_from_object = {};  ///< [F][O]
+  std::optional<std::vector<AnnotatedContact>> contacts = {};      ///< in frames that move; none: nobody annotated any
 
   Index frames() const { return static_cast<Index>(body.size()); }
   Index moving_frames() const { return frames() - still_frames; }
@@ -68,6 +72,6 @@ bool is_foot_joint(Index joint);
 
 /// Points whose largest weight (of equal ones the first) is that of such a joint, ascending: a part of the human on any
 /// mesh.   [method.md, stage 3: hand vertices]
-std::vector<Index> rows_of_joints(const SparseWeights& weights, bool (*is_part)(Index joint));
+std::vector<Index> rows_of_joints(const SparseWeights& weights, const std::function<bool(Index joint)>& is_part);
 
 }  // namespace hsi4d

@@ -1,7 +1,9 @@
 // Parameters that stages move: leaves of a tape under a name that configs know.
 #pragma once
 
+#include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,19 @@ struct ParameterGroup {
   std::vector<Var<S>> blocks;
   bool are_axis_angles = false;  ///< each row is a rotation: a stage keeps it within half a turn (wrap_axis_angles)
   std::optional<ParameterRange> range = {};  ///< a stage keeps every number in it (hold_in_range)
+  /// By block, where each has its own, infinite where that has none; then no `range`. Must outlive the group.
+  std::span<const ParameterRange> block_ranges = {};
+
+  /// What the numbers of a block are kept in; none: nothing.
+  std::optional<ParameterRange> range_of(std::size_t block) const {
+    return block_ranges.empty() ? range : block_ranges[block];
+  }
+  bool has_range() const {
+    for (const ParameterRange& of_block : block_ranges) {
+      if (std::isfinite(of_block.low) || std::isfinite(of_block.high)) return true;
+    }
+    return range.has_value();
+  }
 };
 
 /// The groups' names, in their order.

@@ -18,13 +18,14 @@ void disturb(Tape<double>& tape, const std::vector<OptimizerGroup<double>>& grou
   const Random random(options.differences.seed, random_stream("stage_gradcheck.disturbance"));
   std::uint64_t at = 0;
   for (const OptimizerGroup<double>& group : groups) {
-    for (const Var<double> block : group.parameters.blocks) {
+    for (std::size_t b = 0; b < group.parameters.blocks.size(); ++b) {
+      const Var<double> block = group.parameters.blocks[b];
       const Array<double> numbers = tape.write(block);
       for (Index row = 0; row < numbers.total_rows(); ++row) {
         for (Index col = 0; col < numbers.shape.cols; ++col)
           numbers.row(row)[col] += options.disturbance * random.uniform(at++, -1, 1);
       }
-      if (group.parameters.range) hold_in_range(block, *group.parameters.range);
+      if (const auto range = group.parameters.range_of(b)) hold_in_range(block, *range);
     }
   }
 }

@@ -18,8 +18,9 @@ constexpr Index kMostNumbers = 512;
 
 template <class S>
 void hold(const ParameterGroup<S>& group) {
-  if (!group.range) return;
-  for (const Var<S> block : group.blocks) hold_in_range(block, *group.range);
+  for (std::size_t b = 0; b < group.blocks.size(); ++b) {
+    if (const auto range = group.range_of(b)) hold_in_range(group.blocks[b], *range);
+  }
 }
 
 /// What run_stage wants to be right before anything is recorded.

@@ -49,6 +49,7 @@ const char* words_of(LossInput need) {
     case LossInput::kPose:
     case LossInput::kMotion:
     case LossInput::kObjectMotion:
+    case LossInput::kContacts:
     case LossInput::kBodyVertices:
       return "the body";
   }

@@ -10,6 +10,14 @@ namespace hsi4d {
 
 namespace {
 
+/// The range of a group's numbers in a block.
+template <class S>
+std::optional<ParameterRange> range_of(const ParameterGroup<S>& group, Var<S> block) {
+  const auto is_it = [block](Var<S> other) { return other.id == block.id; };
+  const auto found = std::find_if(group.blocks.begin(), group.blocks.end(), is_it);
+  return group.range_of(static_cast<std::size_t>(found - group.blocks.begin()));
+}
+
 /// Calls visit(number, group, block, row, column of its array) for all numbers, in order.
 template <class S, class F>
 void for_numbers(const std::vector<OptimizerGroup<S>>& groups, const F& visit) {
@@ -33,7 +41,7 @@ UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups
   Index count = 0;
   for (const OptimizerGroup<S>& group : groups_) {
     reports_.push_back({group.parameters.name});
-    if (group.parameters.are_axis_angles || (group.parameters.range && !ranges)) {
+    if (group.parameters.are_axis_angles || (group.parameters.has_range() && !ranges)) {
       throw UserError("group \"" + group.parameters.name + "\": " + method + " does not move " +
                       (ranges ? "" : "numbers that are held in a range, or ") +
                       "rotations as axis and angle; "
@@ -53,7 +61,7 @@ UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups
     unit_[i] = group.settings.lr;
     if (!(unit_[i] > 0)) return;
     start_[i] = static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i];
-    const std::optional<ParameterRange>& range = group.parameters.range;
+    const std::optional<ParameterRange> range = range_of(group.parameters, block);
     low_[i] = std::max(start_[i] - kLongestUnitWay, range ? range->low / unit_[i] : -HUGE_VAL);
     high_[i] = std::min(start_[i] + kLongestUnitWay, range ? range->high / unit_[i] : HUGE_VAL);
   });

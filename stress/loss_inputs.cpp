@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "autodiff/matrix.h"
+#include "body/body_model.h"
 #include "body/pose_layout.h"
 #include "core/random.h"
 #include "core/rotation.h"
@@ -42,6 +43,9 @@ struct StillLife {
           {{Matrix3<double>::Identity(), {x, 0, 0}}, {Matrix3<double>::Identity(), {3, 0, 0}}});
     }
     start.first_body = shifted(0);
+    start.contacts = {
+        {.frame = kLossStill, .joints = {smplx_joint("right_wrist")}, .object = 0},
+        {.frame = kLossStill, .joints = {smplx_joint("left_foot")}, .place = Vector3<double>(0.1, 0, -0.2)}};
   }
 
  private:

@@ -16,6 +16,7 @@
   HSI4D_COMMAND(locate)         \
   HSI4D_COMMAND(follow)         \
   HSI4D_COMMAND(place)          \
+  HSI4D_COMMAND(joint)          \
   HSI4D_COMMAND(mesh)           \
   HSI4D_COMMAND(select_camera)  \
   HSI4D_COMMAND(evaluate)       \

@@ -8,8 +8,8 @@ namespace hsi4d {
 namespace {
 
 /// Inputs that a later clip does not take over.
-constexpr std::array<const char*, 6> kOfOneClip = {"initial",    "keypoints",        "tracks",
-                                                   "depth_maps", "depth_confidence", "truth"};
+constexpr std::array<const char*, 7> kOfOneClip = {"initial",          "keypoints", "tracks", "depth_maps",
+                                                   "depth_confidence", "contacts",  "truth"};
 
 ConfigValue data_of(const ConfigValue& object) {
   const ConfigValue* const data = find_member(object, "data");

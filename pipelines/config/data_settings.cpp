@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/angles.h"
 #include "core/text.h"
 #include "splat/files/splat_file.h"
 
@@ -34,6 +35,54 @@ bool has_hint(const ObjectSettings& object) {
   return !object.first_mask.empty() || !object.first_box.empty() || !object.first_clicks.empty();
 }
 
+void describe(ConfigFields& f, JointSettings& s) {
+  constexpr double kFarthest = 1e6;  // metres
+  f.choice("type", s.type, kJointTypes,
+           "free: it moves as it likes; hinge: it turns about the axis; slide: it moves along it");
+  f.string("parent", s.parent, "The object, named before, that has the axis; empty: the scene");
+  f.numbers("axis", s.axis, {.min = -kFarthest, .max = kFarthest},
+            "Direction of the axis, of any length, in the parent's frame");
+  f.numbers("origin", s.origin, {.min = -kFarthest, .max = kFarthest},
+            "A point of a hinge's axis, in the parent's frame (of an object: relative to its centroid), metres");
+  f.numbers("limits", s.limits, {.min = -kFarthest, .max = kFarthest},
+            "How far it goes from where it is in frame 0: low, high, radians or metres; empty: any way", {0, 2});
+  f.rule({"axis"}, [&s]() -> std::string {
+    const bool is_zero = s.axis[0] == 0 && s.axis[1] == 0 && s.axis[2] == 0;
+    return is_zero ? "an axis of length 0 has no direction" : "";
+  });
+  f.rule({"limits", "type"}, [&s]() -> std::string {
+    if (s.limits.empty()) return "";
+    if (s.limits.size() == 1 || !(s.limits[0] <= 0 && s.limits[1] >= 0 && s.limits[0] < s.limits[1]))
+      return "limits are two numbers, low and high, low <= 0 <= high: 0 is where the object is in frame 0";
+    return s.type == JointType::kHinge && (s.limits[0] < -kPi || s.limits[1] > kPi)
+               ? "a hinge turns by half a turn at most in either direction; allowed: -3.14159 to 3.14159"
+               : "";
+  });
+  f.rule({"type", "parent", "limits"}, [&s]() -> std::string {
+    return s.type != JointType::kFree || (s.parent.empty() && s.limits.empty())
+               ? ""
+               : "an object that is free has no parent and no limits; allowed: hinge, slide";
+  });
+}
+
+namespace {
+
+/// What is wrong with the parents of joints: "" or words.
+std::string parent_problem(const ConfigMap<ObjectSettings>& objects) {
+  std::vector<std::string> before;
+  for (const auto& [name, object] : objects) {
+    const std::string& parent = object.joint.parent;
+    if (!parent.empty() && std::find(before.begin(), before.end(), parent) == before.end())
+      return "the joint of \"" + name + "\" has the parent \"" + parent +
+             "\", which is no object that is named before; allowed: " +
+             (before.empty() ? "\"\", the scene" : joined(before) + ", or \"\", the scene");
+    before.push_back(name);
+  }
+  return "";
+}
+
+}  // namespace
+
 void describe(ConfigFields& f, ObjectSettings& s) {
   f.path("gaussians", s.gaussians, {.must_exist = true},
          "Its Gaussians (" + joined(splat_endings(), " or ") + "), relative to the centroid of their means")
@@ -51,6 +100,7 @@ void describe(ConfigFields& f, ObjectSettings& s) {
   });
   f.rule({"first_clicks"},
          [&s]() -> std::string { return s.first_clicks.size() % 2 == 0 ? "" : "a click has two numbers, x and y"; });
+  f.object("joint", s.joint, "What it hangs on, if it does not move freely");
 }
 
 void describe(ConfigFields& f, LensSettings& s) {
@@ -67,6 +117,7 @@ void describe(ConfigFields& f, DataSettings& s) {
   f.path("scene", s.scene, {.must_exist = true},
          "The static scene (" + joined(splat_endings(), " or ") + "), metres, z up");
   f.map("objects", s.objects, "Rigid objects that move, by name");
+  f.rule({"objects"}, [&s] { return parent_problem(s.objects); });
   f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
   f.path("frames", s.frames, {.must_exist = true},
          "Video file, or folder of .png files sorted by name; as large as the camera's image or larger");
@@ -96,6 +147,8 @@ void describe(ConfigFields& f, DataSettings& s) {
       "with the name of each frame");
   f.path("depth_confidence", s.depth_confidence, {.must_exist = true},
          "Folder of how sure the depth maps are, likewise: a pixel with twice the number counts twice; empty: alike");
+  f.path("contacts", s.contacts, {.must_exist = true},
+         "Which part of the body touches what in which frames, for the loss annotated_contact (.json)");
   f.path("truth", s.truth, {},
          "Folder with motion.npz, objects.npz, cameras.json to compare the result with; may be missing");
   f.path("surface", s.surface, {},

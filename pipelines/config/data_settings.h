@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "core/config.h"
@@ -10,12 +11,28 @@
 
 namespace hsi4d {
 
+/// How an object moves: freely, turning about an axis, or sliding along one.
+enum class JointType { kFree, kHinge, kSlide };
+
+inline constexpr std::array<ConfigChoice<JointType>, 3> kJointTypes = {
+    {{JointType::kFree, "free"}, {JointType::kHinge, "hinge"}, {JointType::kSlide, "slide"}}};
+
+/// The joint of an object (pipelines/input/object_joint.h).
+struct JointSettings {
+  JointType type = JointType::kFree;
+  std::string parent;                        ///< an object that is named before; empty: the scene
+  std::array<double, 3> axis = {0, 0, 1};    ///< in the parent's frame, of any length
+  std::array<double, 3> origin = {0, 0, 0};  ///< a point of a hinge's axis there, metres
+  std::vector<double> limits;                ///< low, high, radians or metres from frame 0; empty: none
+};
+
 /// One rigid object.
 struct ObjectSettings {
   std::filesystem::path gaussians;
   /// What is known of it in frame 0 where hsi4d makes its masks; at most one. Empty: what the state of frame 0 shows.
   std::filesystem::path first_mask = {};
   std::vector<double> first_box = {}, first_clicks = {};  ///< x0, y0, x1, y1; x, y of each; pixels of the video
+  JointSettings joint = {};
 };
 
 /// Whether something is said of where an object is in frame 0.
@@ -50,6 +67,7 @@ struct DataSettings {
   std::filesystem::path tracks;            ///< points that a tracker followed through the video; empty: none
   std::filesystem::path depth_maps;        ///< depths that an estimator found, a file for each frame; empty: none
   std::filesystem::path depth_confidence;  ///< how sure it was, likewise; empty: alike everywhere
+  std::filesystem::path contacts;          ///< what the human touches, as somebody annotated it; empty: nobody did
   std::filesystem::path truth;
   std::filesystem::path surface;  ///< a mesh of what is solid, to measure penetration by; empty: not measured
   double video_rate = 0;          ///< frames a second of the video; 0: what its file says
@@ -67,6 +85,7 @@ inline constexpr const char* kDatasetVideo = "video.mp4";
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.
+void describe(ConfigFields& fields, JointSettings& settings);
 void describe(ConfigFields& fields, ObjectSettings& settings);
 void describe(ConfigFields& fields, LensSettings& settings);
 void describe(ConfigFields& fields, DataSettings& settings);

@@ -12,7 +12,7 @@ constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_
 std::vector<std::string> state_group_names(Draw draw) {
   std::vector<std::string> names = {"camera"};
   if (draw == Draw::kScene) return names;
-  names.insert(names.end(), {"object_orient", "object_transl", "transl"});
+  names.insert(names.end(), {kObjectOrientGroup, kObjectTranslGroup, kObjectJointGroup, kTranslGroup});
   for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
   names.insert(names.end(), {kColorNetGroup, kFeaturesGroup});
   return names;
@@ -33,8 +33,9 @@ std::vector<std::string> unknown_groups_of(const StageSettings& stage) {
 
 std::string state_group_summary(const std::string& name) {
   if (name == "camera") return "Six numbers of the camera, translation and rotation";
-  if (name == "object_orient") return "Rotations of the objects";
-  if (name == "object_transl") return "Places of the objects";
+  if (name == kObjectOrientGroup) return "Rotations of the objects that move freely";
+  if (name == kObjectTranslGroup) return "Places of the objects that move freely";
+  if (name == kObjectJointGroup) return "How far objects have turned or slid on their joints";
   if (name == "transl") return "Place of the body";
   if (name == kColorNetGroup) return "Weights of the network that colours the human, which all frames share";
   if (name == kFeaturesGroup) return "That network's features of each Gaussian, which all frames share";

@@ -30,6 +30,10 @@ inline constexpr const char* kColorNetGroup = "color_net";
 inline constexpr const char* kFeaturesGroup = "avatar_features";
 inline constexpr const char* kTranslGroup = "transl";
 inline constexpr const char* kOrientGroup = "global_orient";
+/// The groups of what places the objects, of those on a joint the last.
+inline constexpr const char* kObjectOrientGroup = "object_orient";
+inline constexpr const char* kObjectTranslGroup = "object_transl";
+inline constexpr const char* kObjectJointGroup = "object_joint";
 /// The group of the latents of the pose prior, which stand for the joints.
 inline constexpr const char* kPoseLatents = "pose_latents";
 

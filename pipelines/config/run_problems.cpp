@@ -404,6 +404,19 @@ void add_keypoint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   }
 }
 
+/// Objects on joints that stay where they are.
+void add_joint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
+  const bool is_moved = std::any_of(config.stages.begin(), config.stages.end(), [](const auto& stage) {
+    return find_entry(stage.second.optimize, kObjectJointGroup) != nullptr;
+  });
+  for (const auto& [name, object] : config.data.objects) {
+    if (object.joint.type == JointType::kFree || is_moved) continue;
+    notes.push_back({LogLevel::kWarning, "data.objects." + name +
+                                             ": stays where its joint has it in frame 0: no stage moves the group " +
+                                             kObjectJointGroup});
+  }
+}
+
 /// Losses without their files, and files without a loss that reads them.
 void add_file_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   if (!config.chain.empty()) return;
@@ -422,6 +435,7 @@ void add_file_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   };
   look("depth_map", LossInput::kDepthMap, "data.depth_maps", config.data.depth_maps);
   look("tracks", LossInput::kTracks, "data.tracks", config.data.tracks);
+  look("annotated_contact", LossInput::kContacts, "data.contacts", config.data.contacts);
 }
 
 /// Whether `problem` may be one only because of another, at the pointer `other`.
@@ -460,6 +474,16 @@ void add_unknown_problems(const RunConfig& config, std::vector<RunProblem>& foun
                          "the mesh of /data/surface does not move with the scene; leave one of the two out",
                          {place, "/data/surface"}});
     }
+  }
+}
+
+/// A joint counts from frame 0 of its clip.
+void add_joint_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  for (const auto& [name, object] : config.data.objects) {
+    if (config.chain.empty() || object.joint.type == JointType::kFree) continue;
+    const std::string place = child_pointer("/data/objects", name) + "/joint";
+    found.push_back(
+        {place, "objects of a chain move freely; leave the joint out, or run its clips alone", {place, "/chain"}});
   }
 }
 
@@ -521,6 +545,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_order_problems(config.stages, found);
   add_start_problems(config, found);
   add_unknown_problems(config, found);
+  add_joint_problems(config, found);
   add_lens_problems(config.data, found);
   add_given_frame_problems(config, found);
   if (config.uncertainty && !config.stages.empty() && !stage_of_sigmas(config))
@@ -570,6 +595,7 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   std::vector<RunNote> notes = optimizer_notes(config);
   add_object_notes(config, notes);
   add_keypoint_notes(config, notes);
+  add_joint_notes(config, notes);
   add_file_notes(config, notes);
   add_hint_notes(config, notes);
   if (config.log.images_every > 0 && !config.log.tensorboard)

@@ -69,6 +69,7 @@ const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion) {
   static const std::vector<Object> chair_or_none = {Object::kOfficeChair, Object::kNone};
   static const std::vector<Object> guitar = {Object::kGuitar};
   static const std::vector<Object> can = {Object::kWateringCan};
+  static const std::vector<Object> gate = {Object::kGate};
   static const std::vector<Object> none = {Object::kNone};
   switch (motion) {
     case SyntheticMotionKind::kPour:
@@ -90,6 +91,8 @@ const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion) {
       return guitar;
     case SyntheticMotionKind::kWater:
       return can;
+    case SyntheticMotionKind::kOpen:
+      return gate;
     case SyntheticMotionKind::kSitOn:
     case SyntheticMotionKind::kLeanOn:
     case SyntheticMotionKind::kRun:

@@ -60,10 +60,11 @@ enum class SyntheticObjectKind {
   kBarbell,
   kShoppingCart,
   kMower,
+  kGate,
   kNone
 };
 
-inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 9> kSyntheticObjectKinds = {
+inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 10> kSyntheticObjectKinds = {
     {{SyntheticObjectKind::kWateringCan, "watering_can"},
      {SyntheticObjectKind::kBox, "box"},
      {SyntheticObjectKind::kVase, "vase"},
@@ -72,6 +73,7 @@ inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 9> kSyntheticObje
      {SyntheticObjectKind::kBarbell, "barbell"},
      {SyntheticObjectKind::kShoppingCart, "shopping_cart"},
      {SyntheticObjectKind::kMower, "mower"},
+     {SyntheticObjectKind::kGate, "gate"},
      {SyntheticObjectKind::kNone, "none"}}};
 
 /// What is done.
@@ -91,10 +93,11 @@ enum class SyntheticMotionKind {
   kWipe,
   kPlay,
   kWater,
-  kRoll
+  kRoll,
+  kOpen
 };
 
-inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 16> kSyntheticMotionKinds = {
+inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 17> kSyntheticMotionKinds = {
     {{SyntheticMotionKind::kPour, "pour"},
      {SyntheticMotionKind::kLift, "lift"},
      {SyntheticMotionKind::kWalk, "walk"},
@@ -110,7 +113,8 @@ inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 16> kSyntheticMot
      {SyntheticMotionKind::kWipe, "wipe"},
      {SyntheticMotionKind::kPlay, "play"},
      {SyntheticMotionKind::kWater, "water"},
-     {SyntheticMotionKind::kRoll, "roll"}}};
+     {SyntheticMotionKind::kRoll, "roll"},
+     {SyntheticMotionKind::kOpen, "open"}}};
 
 /// The objects that a motion makes sense with.
 const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion);

@@ -203,7 +203,7 @@ void FrameGraph<S>::record_moving(std::vector<Part>& parts) {
   const std::optional<SeenRows>& seen = settings_.seen;
   for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
     const ClipObject& object = clip_.objects[o];
-    parts.push_back(seen ? record_object({object.name, selected(object.gaussians, seen->objects[o])})
+    parts.push_back(seen ? record_object({object.name, selected(object.gaussians, seen->objects[o]), object.joint})
                          : record_object(object));
   }
   parts.push_back(seen ? record_human(selected(clip_.avatar, seen->human)) : record_human(clip_.avatar));
@@ -212,20 +212,63 @@ void FrameGraph<S>::record_moving(std::vector<Part>& parts) {
 template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& object) {
   const GaussianVars<S> vars = gaussian_leaves("object", object.name, object.gaussians);
-  const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
-  const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
-  Var<S> rotation = record_rotations(orient);
-  const Var<S> turn = rigid_rows(rotation, transl);
+  Object placed = object.joint ? object_on_joint(object.name, *object.joint) : free_object(object.name);
+  const Var<S> turn = rigid_rows(placed.turn, placed.transl);
   Var<S> transform = turn;
+  placed.rotation = placed.turn;
   if (is_unknown(kObjectScaleGroup)) {
     unknown_.object_scale.push_back(leaf(kObjectScaleGroup, object.name + " scale", 1, 1, nullptr));
-    rotation = rotation * exp(unknown_.object_scale.back());
-    transform = rigid_rows(rotation, transl);
+    placed.rotation = placed.turn * exp(unknown_.object_scale.back());
+    transform = rigid_rows(placed.rotation, placed.transl);
   }
-  objects_.push_back({orient, transl, rotation});
+  objects_.push_back(placed);
   const SplatInputs<S> splats = moved_splats(vars, in_scene(transform, kHeightOfTransform), turn, xi_, view_);
   hold_colors(splats.colors, {"object_sh"});
   return {splats, object.gaussians.count()};
+}
+
+template <class S>
+typename FrameGraph<S>::Object FrameGraph<S>::free_object(const std::string& name) {
+  Object object;
+  object.orient = rotation_leaf(kObjectOrientGroup, name + " orient", 1);
+  object.transl = leaf(kObjectTranslGroup, name + " transl", 1, 3, nullptr);
+  object.turn = record_rotations(object.orient);
+  return object;
+}
+
+/// on_joint (pipelines/input/object_joint.h) of a leaf q, after the parent's pose.
+template <class S>
+typename FrameGraph<S>::Object FrameGraph<S>::object_on_joint(const std::string& name, const ObjectJoint& joint) {
+  Object object;
+  object.joint = tape_.parameter(name + " joint", kScalarShape);
+  joint_ranges_.push_back({joint.low, joint.high});
+  add_to_group(kObjectJointGroup, object.joint).block_ranges = joint_ranges_;
+  const auto constant = [this](const char* what, const auto& matrix) {
+    const Var<S> var = tape_.constant(what, shape_of(matrix.rows(), matrix.cols()));
+    for (Index r = 0; r < matrix.rows(); ++r) {
+      for (Index c = 0; c < matrix.cols(); ++c) tape_.write(var)(r, c) = static_cast<S>(matrix(r, c));
+    }
+    return var;
+  };
+  Var<S> rotation = constant("joint_rest_rotation", joint.rest.rotation), place;  // [3,3], [3,1]
+  if (joint.type == JointType::kHinge) {
+    const Var<S> axis_angle = constant("joint_axis", joint.axis.transpose()) * object.joint;
+    const Var<S> turn = reshape(rotations_from_axis_angle(axis_angle), 3, 3);
+    const Vector3<double> arm = joint.rest.translation - joint.origin;
+    rotation = matmul(turn, rotation);
+    place = matmul(turn, constant("joint_arm", arm)) + constant("joint_origin", joint.origin);
+  } else {
+    place = constant("joint_axis", joint.axis) * object.joint + constant("joint_rest_place", joint.rest.translation);
+  }
+  if (joint.parent) {
+    const Object& parent = objects_[static_cast<std::size_t>(*joint.parent)];
+    const Var<S> turn = reshape(parent.turn, 3, 3);
+    rotation = matmul(turn, rotation);
+    place = matmul(turn, place) + reshape(parent.transl, 3, 1);
+  }
+  object.turn = reshape(rotation, 1, 9);
+  object.transl = reshape(place, 1, 3);
+  return object;
 }
 
 template <class S>
@@ -362,12 +405,13 @@ Rendered<S> FrameGraph<S>::render_parts(const std::vector<Part>& parts, const Re
 }
 
 template <class S>
-void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<SceneState>& frames) {
+void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<SceneState>& frames, Index index) {
   HSI4D_CHECK(settings_.draw == Draw::kAll, "a graph of the scene alone has no body");
   std::vector<Var<S>> transforms;
   for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
   const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
-  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects, rest_offsets_}, clip_, first, frames, inputs_);
+  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects, rest_offsets_}, clip_, first, frames, index,
+                     inputs_);
 }
 
 /// The human's points first, then those of the objects.
@@ -420,10 +464,15 @@ Var<S> FrameGraph<S>::places_in_image(Var<S> points) const {
 
 /// A pose's translation is where the object's centroid is.
 template <class S>
-void FrameGraph<S>::record_object_places() {
+std::vector<Var<S>> FrameGraph<S>::object_places() const {
   std::vector<Var<S>> centroids;
   for (const Object& object : objects_) centroids.push_back(object.transl);
-  inputs_.object_place = places_in_image(concat_rows<S>(centroids));
+  return centroids;
+}
+
+template <class S>
+void FrameGraph<S>::record_object_places() {
+  inputs_.object_place = places_in_image(concat_rows<S>(object_places()));
 }
 
 /// A point is a mean of joints.
@@ -497,6 +546,11 @@ void FrameGraph<S>::set_state(const SceneState& state) {
   if (settings_.draw == Draw::kScene) return;
   HSI4D_CHECK_EQ(state.objects.size(), objects_.size());
   for (std::size_t o = 0; o < objects_.size(); ++o) {
+    if (const std::optional<ObjectJoint>& joint = clip_.objects[o].joint) {
+      const double q = joint_value(*joint, parent_from_object(*joint, state.objects, o));
+      write_numbers(tape_, objects_[o].joint, &q);
+      continue;
+    }
     write_rotation(objects_[o].orient, 0, state.objects[o].rotation);
     write_numbers(tape_, objects_[o].transl, state.objects[o].translation.data());
   }
@@ -518,9 +572,16 @@ void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, S
     const Vector6<double> xi = xi_from_update_ * update;
     state.camera_from_world = se3_update(xi, view_.camera.camera_from_world);
   }
+  const bool is_parent_moved = is_moved(kObjectOrientGroup) || is_moved(kObjectTranslGroup);
   for (std::size_t o = 0; o < objects_.size(); ++o) {
-    if (is_moved("object_orient")) state.objects[o].rotation = read_rotation(objects_[o].orient, 0);
-    if (is_moved("object_transl")) state.objects[o].translation = read_vector(tape_, objects_[o].transl);
+    if (const std::optional<ObjectJoint>& joint = clip_.objects[o].joint) {
+      if (!is_parent_moved && !is_moved(kObjectJointGroup)) continue;
+      const double q = static_cast<double>(tape_.value(objects_[o].joint).scalar());
+      state.objects[o] = pose_of(compose(world_from_parent(*joint, state.objects), on_joint(*joint, q)));
+      continue;
+    }
+    if (is_moved(kObjectOrientGroup)) state.objects[o].rotation = read_rotation(objects_[o].orient, 0);
+    if (is_moved(kObjectTranslGroup)) state.objects[o].translation = read_vector(tape_, objects_[o].transl);
   }
   if (is_moved("transl")) state.body.transl = read_vector(tape_, transl_);
   for (std::size_t g = 0; g < joint_rotations_.size(); ++g) {

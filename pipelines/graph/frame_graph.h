@@ -1,7 +1,7 @@
 // One frame on a tape: from the parameters of camera, human and objects to the image and the inputs of the losses.
 //
 //   scene       means, quats, log_scales, opacity_logits, sh                                ─┐
-//   object o    the same, moved by [exp(orient) | transl]                                     ├─ render ─ image, masks
+//   object o    the same, moved by [exp(orient) | transl], or on a joint by one number        ├─ render ─ image, masks
 //   human       rotations → kinematic chain → blended transforms → means, axes; color net   ─┘
 //
 // Every number that the image depends on is a leaf, frozen unless a stage moves it, so that each can be optimised, and
@@ -99,7 +99,8 @@ class FrameGraph {
   /// Records what terms over the body's motion read. For graphs that draw all, once, after set_state.
   /// @param first   the clip's first frame
   /// @param frames  the states before this frame that such terms see, and last the one that was set
-  void give_motion(const SceneState& first, const std::vector<SceneState>& frames);
+  /// @param index   in the clip, of the first of these
+  void give_motion(const SceneState& first, const std::vector<SceneState>& frames, Index index = 0);
   /// Records points that tracks follow, and where these are in the frame. After give_motion, once.
   /// @param points  some at least
   /// @param places  by track
@@ -111,6 +112,8 @@ class FrameGraph {
   const LossInputs<S>& loss_inputs() const { return inputs_; }
   /// Everything that may move, all of it frozen.
   const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
+  /// Where the objects' centroids are, [1,3] metres each, world, in the clip's order.
+  std::vector<Var<S>> object_places() const;
   /// Colours, where settings.hold_colors says so.
   const std::vector<HeldOutput>& held() const { return held_; }
 
@@ -120,8 +123,10 @@ class FrameGraph {
     Index count = 0;
   };
   struct Object {
-    Var<S> orient, transl;
-    Var<S> rotation;  // [1,9] that orient gives, times the object's factor where that is unknown
+    Var<S> orient, transl;  // leaves; of one on a joint transl is what that gives, and there is no orient
+    Var<S> joint;           // [1,1] a leaf, of one on a joint
+    Var<S> turn;            // [1,9] the rotation
+    Var<S> rotation;        // [1,9] the same, times the object's factor where that is unknown
   };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
@@ -137,6 +142,8 @@ class FrameGraph {
   Part record_scene(const Gaussians& scene);
   void record_moving(std::vector<Part>& parts);
   Part record_object(const ClipObject& object);
+  Object free_object(const std::string& name);
+  Object object_on_joint(const std::string& name, const ObjectJoint& joint);
   Part record_human(const Avatar& avatar);
   PosedSkeleton<S> record_skeleton(const Avatar& avatar);
   HumanColors<S> record_color_net(const ColorNet& net);
@@ -171,6 +178,7 @@ class FrameGraph {
   UnknownVars<S> unknown_;
   Var<S> intrinsics_;  // [1,4], or empty: the clip's
   std::vector<Object> objects_;
+  std::vector<ParameterRange> joint_ranges_;  // by block of the joints' group
   Var<S> transl_;
   Var<S> rest_offsets_;                  // [N,3] of the human's means by unknown betas, or empty
   std::vector<Var<S>> joint_rotations_;  // by kJointGroups

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "body/skinning.h"
 #include "body/vposer.h"
@@ -16,8 +17,20 @@ namespace {
 
 constexpr Index kCoordinates = 3 * kMetricJoints;
 
+/// Those of the frames that move, by these frames' numbers.
+/// @param index  in the clip, of the first frame
+std::vector<AnnotatedContact> contacts_of(const std::vector<AnnotatedContact>& all, Index index,
+                                          const MotionStart& motion) {
+  std::vector<AnnotatedContact> contacts;
+  for (AnnotatedContact contact : all) {
+    contact.frame -= index;
+    if (contact.frame >= motion.still_frames && contact.frame < motion.frames()) contacts.push_back(contact);
+  }
+  return contacts;
+}
+
 std::shared_ptr<const MotionStart> start_of(const Clip& clip, const SceneState& first,
-                                            const std::vector<SceneState>& frames, Index moving) {
+                                            const std::vector<SceneState>& frames, Index index, Index moving) {
   auto start = std::make_shared<MotionStart>();
   start->avatar = &clip.avatar;
   start->mesh = clip.body ? &*clip.body : nullptr;
@@ -33,6 +46,7 @@ std::shared_ptr<const MotionStart> start_of(const Clip& clip, const SceneState& 
     for (const ObjectPose& pose : frame.objects) objects.push_back({so3_exp(pose.rotation), pose.translation});
     start->world_from_object.push_back(std::move(objects));
   }
+  if (clip.contacts) start->contacts = contacts_of(*clip.contacts, index, *start);
   return start;
 }
 
@@ -143,9 +157,9 @@ Var<S> record_object_points(Tape<S>& tape, Var<S> transforms, const MotionStart&
 
 template <class S>
 void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
-                 const std::vector<SceneState>& frames, LossInputs<S>& inputs) {
+                 const std::vector<SceneState>& frames, Index index, LossInputs<S>& inputs) {
   const Index count = moving.rotations.shape().rows / kSmplxJoints;
-  const std::shared_ptr<const MotionStart> motion = start_of(clip, first, frames, count);
+  const std::shared_ptr<const MotionStart> motion = start_of(clip, first, frames, index, count);
   inputs.motion = motion;
   inputs.body_rotations = body_rotation_rows(moving.rotations);
   inputs.joints = joint_rows(moving, *motion);
@@ -162,8 +176,8 @@ void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneSta
 }
 
 template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
-                          LossInputs<float>&);
+                          Index, LossInputs<float>&);
 template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
-                          LossInputs<double>&);
+                          Index, LossInputs<double>&);
 
 }  // namespace hsi4d

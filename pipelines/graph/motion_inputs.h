@@ -20,14 +20,15 @@ struct MovingFrames {
 ///
 /// @param first   the clip's first frame
 /// @param frames  states when the stage begins: some that stand still, then the M that move
+/// @param index   in the clip, of the first of these
 /// The clip must outlive the inputs.
 template <class S>
 void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
-                 const std::vector<SceneState>& frames, LossInputs<S>& inputs);
+                 const std::vector<SceneState>& frames, Index index, LossInputs<S>& inputs);
 
 extern template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&,
-                                 const std::vector<SceneState>&, LossInputs<float>&);
+                                 const std::vector<SceneState>&, Index, LossInputs<float>&);
 extern template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&,
-                                 const std::vector<SceneState>&, LossInputs<double>&);
+                                 const std::vector<SceneState>&, Index, LossInputs<double>&);
 
 }  // namespace hsi4d

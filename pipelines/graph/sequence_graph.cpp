@@ -78,7 +78,7 @@ SequenceGraph<S>::SequenceGraph(Tape<S>& tape, const Clip& clip, const std::vect
   MovingFrames<S> moving;
   moving.rotations = record_rotations(states, prior);
   moving.skeleton = kinematic_chain(moving.rotations, transl_, clip.avatar.parents, clip.avatar.joints);
-  give_motion(moving, clip, states.front(), states, inputs_);
+  give_motion(moving, clip, states.front(), states, 0, inputs_);
   for (const ParameterGroup<S>& group : groups_) {
     for (const Var<S> block : group.blocks) tape_.freeze(block);
   }

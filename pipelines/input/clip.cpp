@@ -15,6 +15,7 @@
 #include "optim/solid/mesh_distance.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/body_files.h"
+#include "pipelines/input/contacts.h"
 #include "pipelines/input/frame_cameras.h"
 #include "pipelines/input/pose_estimate.h"
 #include "pipelines/input/straight_keypoints.h"
@@ -260,6 +261,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   if (!data.keypoints.empty()) clip.keypoints = read_keypoints(data, video->frames);
   if (!data.tracks.empty()) clip.tracks = read_point_tracks(data, video->frames);
   if (!data.depth_maps.empty()) clip.depth_maps = find_depth_maps(data, video->frames);
+  if (!data.contacts.empty()) clip.contacts = read_contacts(data.contacts.string(), {names, clip.frames()});
   if (!data.lens.estimate_k1) set_lens(data.lens.lens, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);
@@ -278,6 +280,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
                 {"/data/initial: /motion", setup.motion_file}};
   if (!data.motion.empty()) clip.files.push_back({"/data/motion", data.motion});
   if (!data.tracks.empty()) clip.files.push_back({"/data/tracks", data.tracks});
+  if (!data.contacts.empty()) clip.files.push_back({"/data/contacts", data.contacts});
   if (!data.keypoint_joints.empty()) clip.files.push_back({"/data/keypoint_joints", data.keypoint_joints});
   for (const fs::path& file : keypoint_files(data.keypoints))
     clip.files.push_back({"/data/keypoints: " + file.filename().string(), file});

@@ -11,6 +11,7 @@
 #include "core/camera.h"
 #include "core/image.h"
 #include "core/lens.h"
+#include "optim/annotated_contact.h"
 #include "optim/solid/mesh_distance.h"
 #include "pipelines/config/data_settings.h"
 #include "pipelines/config/masks.h"
@@ -41,20 +42,21 @@ struct Clip {
   Gaussians scene;
   std::vector<ClipObject> objects;
   Avatar avatar;
-  std::optional<BodyModel> body;                         ///< that the avatar was made on, where a loss asks for it
-  std::optional<AvatarDirections> directions;            ///< how the avatar follows betas, where a stage moves them
-  Camera camera;                                         ///< of frame 0; size and intrinsics of all frames
-  SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
-  std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none
-  std::vector<std::vector<ObjectPose>> object_estimate;  ///< estimated poses [frame][object]; empty: none
-  std::optional<Keypoints> keypoints;                    ///< of data.keypoints
-  std::optional<PointTracks> tracks;                     ///< of data.tracks
-  std::optional<DepthMaps> depth_maps;                   ///< of data.depth_maps
-  std::vector<double> betas;                             ///< of the person, as the motion file says; empty: not known
-  std::string gender = "neutral";                        ///< of the body model, likewise
-  double frame_rate = 10;                                ///< frames a second
-  std::vector<std::string> frame_files;                  ///< names of the frames, in order
-  std::shared_ptr<const ClipVideo> video;                ///< what read_frame reads
+  std::optional<BodyModel> body;                          ///< that the avatar was made on, where a loss asks for it
+  std::optional<AvatarDirections> directions;             ///< how the avatar follows betas, where a stage moves them
+  Camera camera;                                          ///< of frame 0; size and intrinsics of all frames
+  SceneState first;                                       ///< state of frame 0, given; poses are of the avatar's body
+  std::vector<BodyPose> estimate;                         ///< estimated poses by frame; empty: none
+  std::vector<std::vector<ObjectPose>> object_estimate;   ///< estimated poses [frame][object]; empty: none
+  std::optional<Keypoints> keypoints;                     ///< of data.keypoints
+  std::optional<PointTracks> tracks;                      ///< of data.tracks
+  std::optional<DepthMaps> depth_maps;                    ///< of data.depth_maps
+  std::optional<std::vector<AnnotatedContact>> contacts;  ///< of data.contacts
+  std::vector<double> betas;                              ///< of the person, as the motion file says; empty: not known
+  std::string gender = "neutral";                         ///< of the body model, likewise
+  double frame_rate = 10;                                 ///< frames a second
+  std::vector<std::string> frame_files;                   ///< names of the frames, in order
+  std::shared_ptr<const ClipVideo> video;                 ///< what read_frame reads
   std::optional<std::vector<SceneState>> truth;
   std::shared_ptr<const MeshDistance> surface;  ///< of data.surface; null: not known
   std::string surface_file;

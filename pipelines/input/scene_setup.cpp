@@ -78,6 +78,18 @@ ObjectPose initial_pose(const InitialSettings& initial, const std::string& name,
   return {Vector3<double>(pose->rotation.data()), Vector3<double>(pose->translation.data())};
 }
 
+/// The joint of the object that is read after those of `setup`.
+std::optional<ObjectJoint> joint_of(const JointSettings& settings, const ObjectPose& pose, const SceneSetup& setup) {
+  if (settings.type == JointType::kFree) return {};
+  std::optional<Index> parent;
+  for (std::size_t o = 0; o < setup.objects.size(); ++o) {
+    if (setup.objects[o].name == settings.parent) parent = static_cast<Index>(o);
+  }
+  ObjectJoint joint = object_joint(settings, parent);
+  joint.rest = compose(inverse(world_from_parent(joint, setup.poses)), rigid_of(pose));
+  return joint;
+}
+
 }  // namespace
 
 Gaussians read_object(const fs::path& file) { return centred(read_gaussians(file).gaussians); }
@@ -94,9 +106,12 @@ SceneSetup read_scene_setup(const DataSettings& data) {
   }
   const InitialSettings initial = read_initial(data.initial);
   for (const auto& [name, object] : data.objects) {
+    const ObjectPose pose = initial_pose(initial, name, data.initial);
+    const std::optional<ObjectJoint> joint = joint_of(object.joint, pose, setup);
     SplatFile read = read_gaussians(object.gaussians);
-    setup.objects.push_back({name, centred(take_gaussians(std::move(read), object.gaussians, setup.antialiased))});
-    setup.poses.push_back(initial_pose(initial, name, data.initial));
+    setup.objects.push_back(
+        {name, centred(take_gaussians(std::move(read), object.gaussians, setup.antialiased)), joint});
+    setup.poses.push_back(pose);
   }
   setup.motion_file = initial.motion;
   setup.object_tracks = initial.object_tracks;

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "body/avatar.h"
 #include "body/motion_io.h"
 #include "pipelines/config/data_settings.h"
+#include "pipelines/input/object_joint.h"
 #include "pipelines/input/state.h"
 #include "splat/gaussians.h"
 
@@ -16,7 +18,8 @@ namespace hsi4d {
 /// One rigid object that moves.
 struct ClipObject {
   std::string name;
-  Gaussians gaussians;  ///< relative to the centroid of their means
+  Gaussians gaussians;                    ///< relative to the centroid of their means
+  std::optional<ObjectJoint> joint = {};  ///< none: it moves freely
 };
 
 struct SceneSetup {

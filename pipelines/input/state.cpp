@@ -39,6 +39,12 @@ std::vector<double> read_track(const Npz& npz, const std::string& name, std::int
 
 }  // namespace
 
+Rigid<double> rigid_of(const ObjectPose& pose) { return {so3_exp(pose.rotation), pose.translation}; }
+
+ObjectPose pose_of(const Rigid<double>& world_from_object) {
+  return {so3_log(world_from_object.rotation), world_from_object.translation};
+}
+
 PlaceSigmas no_sigmas(std::size_t objects) {
   constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
   return {std::vector<PlaceSigma>(static_cast<std::size_t>(kMetricJoints), {kNotANumber, kNotANumber}),
@@ -46,7 +52,8 @@ PlaceSigmas no_sigmas(std::size_t objects) {
 }
 
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,
-                         const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas) {
+                         const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas,
+                         const std::vector<JointTrack>& joints) {
   NpzWriter writer;
   const auto count = static_cast<std::int64_t>(frames.size());
   for (std::size_t o = 0; o < names.size(); ++o) {
@@ -57,6 +64,7 @@ void write_object_tracks(const std::string& path, const std::vector<std::string>
     for (const PlaceSigmas& frame : sigmas) append(frame.objects.at(o), numbers);
     writer.add<double>(names[o] + "/sigma", {count, 2}, numbers);
   }
+  for (const JointTrack& joint : joints) writer.add<double>(joint.object + "/joint", {count}, joint.values);
   writer.write(path);
 }
 

@@ -16,6 +16,11 @@ struct ObjectPose {
   Vector3<double> translation = Vector3<double>::Zero();  ///< metres, world
 };
 
+/// world_from_object.
+Rigid<double> rigid_of(const ObjectPose& pose);
+/// The pose of it, the angle up to π.
+ObjectPose pose_of(const Rigid<double>& world_from_object);
+
 /// Everything that moves, at one frame.
 struct SceneState {
   Rigid<double> camera_from_world;
@@ -43,11 +48,18 @@ struct PlaceSigmas {
 /// Of a frame that nobody looked at.
 PlaceSigmas no_sigmas(std::size_t objects);
 
-/// Writes objects.npz: NAME/rotation [T,3] and NAME/translation [T,3], and NAME/sigma [T,2] (across, along) where it is
-/// known; float64.
+/// How far an object has moved on its joint, by frame (pipelines/input/object_joint.h).
+struct JointTrack {
+  std::string object;
+  std::vector<double> values;  ///< [T] radians or metres
+};
+
+/// Writes objects.npz: NAME/rotation [T,3] and NAME/translation [T,3], NAME/sigma [T,2] (across, along) where it is
+/// known, and NAME/joint [T] of objects on joints; float64.
 /// @param sigmas  by frame; empty: not known
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,
-                         const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas = {});
+                         const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas = {},
+                         const std::vector<JointTrack>& joints = {});
 
 /// The joints' as motion.npz has them: [T,kMetricJoints,2] (across, along), metres; empty where none are known.
 std::vector<double> joint_sigmas_of(const std::vector<PlaceSigmas>& sigmas);

@@ -153,6 +153,22 @@ Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
   return motion;
 }
 
+namespace {
+
+std::vector<JointTrack> joint_tracks(const Clip& clip, const std::vector<SceneState>& states) {
+  std::vector<JointTrack> tracks;
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    const std::optional<ObjectJoint>& joint = clip.objects[o].joint;
+    if (!joint) continue;
+    JointTrack& track = tracks.emplace_back(JointTrack{clip.objects[o].name, {}});
+    for (const SceneState& state : states)
+      track.values.push_back(joint_value(*joint, parent_from_object(*joint, state.objects, o)));
+  }
+  return tracks;
+}
+
+}  // namespace
+
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
                    const std::vector<SceneState>& states, const ColorState& colors,
                    const std::vector<PlaceSigmas>& sigmas) {
@@ -161,7 +177,7 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
   const Motion motion = motion_of(clip, states);
   write_motion(paths.motion(), motion, joint_sigmas_of(sigmas));
   write_motion(paths.motion_at_30(), resampled(motion, kExportedRate));
-  if (!names.empty()) write_object_tracks(paths.objects(), names, states, sigmas);
+  if (!names.empty()) write_object_tracks(paths.objects(), names, states, sigmas, joint_tracks(clip, states));
   write_cameras(paths.cameras(), cameras_of(states, clip.camera));
   if (colors.net && moves_colors(config)) write_color_net(paths.color_net(), *colors.net);
 }

@@ -49,7 +49,14 @@ void remove_depth_bias(const Clip& clip, const DepthBias& bias, SceneState& stat
     return (place - center) * (1 / factor - 1);
   };
   state.body.transl += shift(pelvis_of(clip, state), bias.human);
+  const std::vector<ObjectPose> before = state.objects;
   for (std::size_t o = 0; o < state.objects.size(); ++o) {
+    if (const std::optional<ObjectJoint>& joint = clip.objects[o].joint) {
+      if (!joint->parent) continue;
+      const Rigid<double> on_parent = parent_from_object(*joint, before, o);
+      state.objects[o] = pose_of(compose(world_from_parent(*joint, state.objects), on_parent));
+      continue;
+    }
     Vector3<double>& place = state.objects[o].translation;
     place += shift(place, bias.objects[o]);
   }

@@ -27,7 +27,7 @@ inline constexpr double kMostDepthBias = 0.05;
 DepthBias depth_bias(const Clip& clip, const ClipFrame& frame, double mask_threshold, const SceneState& given,
                      const SceneState& fitted);
 
-/// Moves human and objects along their lines of sight to where they are without it.
+/// Moves human and objects along their lines of sight to where they are without it. Objects on joints stay on these.
 void remove_depth_bias(const Clip& clip, const DepthBias& bias, SceneState& state);
 
 /// "human 1.0027, vase 1.0012"

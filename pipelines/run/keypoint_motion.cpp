@@ -83,8 +83,8 @@ RunConfig keypoint_motion_config(const RunConfig& run, const std::vector<LossDes
   int& side = config.approx.longest_side_px;
   side = side > 0 ? std::min(side, kSide) : kSide;
   DataSettings& data = config.data;
-  for (fs::path* const unused :
-       {&data.motion, &data.tracks, &data.depth_maps, &data.depth_confidence, &data.truth, &data.surface})
+  for (fs::path* const unused : {&data.motion, &data.tracks, &data.depth_maps, &data.depth_confidence, &data.contacts,
+                                 &data.truth, &data.surface})
     unused->clear();
   data.lens.estimate_k1 = false;
   return config;

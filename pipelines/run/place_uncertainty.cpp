@@ -85,8 +85,9 @@ Noise noise_of(const ConstArray<S>& a, const ConstArray<S>& b, Index side, const
 // ---- From parameters to places ----
 
 bool is_rotation(const std::string& group) {
-  return group == "object_orient" || std::any_of(kJointGroups.begin(), kJointGroups.end(),
-                                                 [&group](const JointGroup& joints) { return group == joints.name; });
+  return group == kObjectOrientGroup ||
+         std::any_of(kJointGroups.begin(), kJointGroups.end(),
+                     [&group](const JointGroup& joints) { return group == joints.name; });
 }
 
 template <class S>
@@ -269,22 +270,20 @@ class Estimate {
 
 template <class S>
 PlaceSigmas place_sigmas(Tape<S>& tape, const StageTask& task, const std::vector<ParameterGroup<S>>& available,
-                         const LossInputs<S>& inputs, const Image& foreground,
+                         const LossInputs<S>& inputs, const std::vector<Var<S>>& objects, const Image& foreground,
                          const Matrix3<double>& camera_from_world) {
   struct Restored {
     TapeGuard<S> guard;
     ~Restored() { guard.restore(); }
   } restored{{tape, available}};
-  std::vector<Var<S>> objects;
-  for (const ParameterGroup<S>& group : available) {
-    if (group.name == "object_transl") objects = group.blocks;
-  }
   return Estimate<S>(tape, task, available, inputs, foreground).sigmas(objects, camera_from_world);
 }
 
 template PlaceSigmas place_sigmas(Tape<float>&, const StageTask&, const std::vector<ParameterGroup<float>>&,
-                                  const LossInputs<float>&, const Image&, const Matrix3<double>&);
+                                  const LossInputs<float>&, const std::vector<Var<float>>&, const Image&,
+                                  const Matrix3<double>&);
 template PlaceSigmas place_sigmas(Tape<double>&, const StageTask&, const std::vector<ParameterGroup<double>>&,
-                                  const LossInputs<double>&, const Image&, const Matrix3<double>&);
+                                  const LossInputs<double>&, const std::vector<Var<double>>&, const Image&,
+                                  const Matrix3<double>&);
 
 }  // namespace hsi4d

@@ -35,16 +35,19 @@ inline constexpr double kSigmaFactor = 2.5;
 ///
 /// @param task              the stage
 /// @param available, inputs what the stage was recorded with
+/// @param objects           [1,3] where each object's centroid is
 /// @param foreground        [1,H,W] of the frame's masks
 /// @param camera_from_world rotation of the frame's camera
 template <class S>
 PlaceSigmas place_sigmas(Tape<S>& tape, const StageTask& task, const std::vector<ParameterGroup<S>>& available,
-                         const LossInputs<S>& inputs, const Image& foreground,
+                         const LossInputs<S>& inputs, const std::vector<Var<S>>& objects, const Image& foreground,
                          const Matrix3<double>& camera_from_world);
 
 extern template PlaceSigmas place_sigmas(Tape<float>&, const StageTask&, const std::vector<ParameterGroup<float>>&,
-                                         const LossInputs<float>&, const Image&, const Matrix3<double>&);
+                                         const LossInputs<float>&, const std::vector<Var<float>>&, const Image&,
+                                         const Matrix3<double>&);
 extern template PlaceSigmas place_sigmas(Tape<double>&, const StageTask&, const std::vector<ParameterGroup<double>>&,
-                                         const LossInputs<double>&, const Image&, const Matrix3<double>&);
+                                         const LossInputs<double>&, const std::vector<Var<double>>&, const Image&,
+                                         const Matrix3<double>&);
 
 }  // namespace hsi4d

@@ -160,7 +160,10 @@ RecordedFrame<S> record_frame(Tape<S>& tape, const StageTask& task, const FrameT
   auto recorded = std::make_unique<FrameGraph<S>>(tape, task.clip, state.camera_from_world, settings);
   FrameGraph<S>& graph = *recorded;
   graph.set_state(state);
-  if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
+  if (stage.draw == Draw::kAll) {
+    const std::vector<SceneState> seen = seen_frames(frame.done, state);
+    graph.give_motion(first_state(task, frame), seen, frame.index + 1 - std::ssize(seen));
+  }
   give_tracks(graph, task, frame);
   const Image weight = pixel_weights(stage, frame, task.config);
   graph.set_targets(targets_of(task, frame, state, weight));
@@ -205,8 +208,8 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   if (task.found != nullptr) *task.found = graph->unknowns();
   if (colors.net) graph->read_color_net(stage.optimize, *colors.net);
   if (task.sigmas != nullptr)
-    *task.sigmas = place_sigmas<S>(tape, task, graph->groups(), inputs, foreground_of(frame.frame),
-                                   state.camera_from_world.rotation);
+    *task.sigmas = place_sigmas<S>(tape, task, graph->groups(), inputs, graph->object_places(),
+                                   foreground_of(frame.frame), state.camera_from_world.rotation);
   const Camera& drawn = task.clip.camera;
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,

@@ -17,6 +17,7 @@
 #include "pipelines/draw/plate_mark.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/body_files.h"
+#include "pipelines/input/contacts.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
 #include "pipelines/run/keypoint_motion.h"
@@ -156,7 +157,7 @@ void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
   if (difference.empty()) {
     clip.body = std::move(body);
   } else {
-    log_warning(loss + "/points: the avatar's Gaussians stand for the vertices of `body`: " + difference);
+    log_warning(loss + ": the avatar's Gaussians stand for the vertices of `body`: " + difference);
   }
 }
 
@@ -202,6 +203,9 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
   const std::string loss = loss_with(config, LossInput::kBodyVertices);
   if (!loss.empty()) give_body(config, loss, clip);
+  if (clip.contacts && !loss_with(config, LossInput::kContacts).empty())
+    check_contacts(*clip.contacts, clip.body ? &*clip.body : nullptr, clip.avatar.weights,
+                   config.data.contacts.string());
   const std::string betas = betas_group(config);
   if (!betas.empty()) give_directions(config, betas, clip);
   give_shape(config, clip);

@@ -129,12 +129,17 @@ const ParameterGroup<S>& StageSession<S>::checked_group(const GroupNumbers<S>& n
       std::ssize(numbers.numbers) != numbers.rows * numbers.cols)
     throw refused(group.name + ": an array [" + std::to_string(numbers.rows) + "," + std::to_string(numbers.cols) +
                   "]; allowed: [" + std::to_string(matrix.rows) + "," + std::to_string(matrix.cols) + "]");
-  for (const S number : numbers.numbers) {
-    const bool is_inside = !group.range || (number >= group.range->low && number <= group.range->high);
-    if (std::isfinite(number) && is_inside) continue;
-    throw refused(group.name + ": " + std::to_string(number) + "; allowed: " +
-                  (group.range ? number_text(group.range->low) + " to " + number_text(group.range->high)
-                               : std::string("finite numbers")));
+  std::size_t at = 0;
+  for (std::size_t b = 0; b < group.blocks.size(); ++b) {
+    const std::optional<ParameterRange> range = group.range_of(b);
+    for (Index i = 0; i < group.blocks[b].shape().count(); ++i) {
+      const S number = numbers.numbers[at++];
+      const bool is_inside = !range || (number >= range->low && number <= range->high);
+      if (std::isfinite(number) && is_inside) continue;
+      throw refused(
+          group.name + ": " + std::to_string(number) + "; allowed: " +
+          (range ? number_text(range->low) + " to " + number_text(range->high) : std::string("finite numbers")));
+    }
   }
   return group;
 }

@@ -67,13 +67,25 @@ void add_file(ConfigValue& data, std::string_view key, const fs::path& file) {
   data.add(key, ConfigValue::make_string(file.generic_string()));
 }
 
+/// The joint of an object that turns about an upright axis, as a config names it.
+/// @param first  where it is in frame 0
+ConfigValue hinge_of(const SyntheticObject& object, const Rigid<double>& first) {
+  ConfigValue joint = object_config_of("type", ConfigValue::make_string("hinge"));
+  joint.add("axis", numbers(Vector3<double>::UnitZ()));
+  joint.add("origin", numbers(transform_point(first, *object.hinge)));
+  return joint;
+}
+
 /// Files that all clips share.
-ConfigValue shared_data(const SyntheticObject& object, bool has_surface) {
+/// @param first  where the object is in frame 0
+ConfigValue shared_data(const SyntheticObject& object, const std::optional<Rigid<double>>& first, bool has_surface) {
   ConfigValue data = ConfigValue::make_object();
   add_file(data, "scene", "scene.ply");
   if (object.exists()) {
     const ConfigValue file = ConfigValue::make_string("objects/" + object.name + ".ply");
-    data.add("objects", object_config_of(object.name, object_config_of("gaussians", file)));
+    ConfigValue settings = object_config_of("gaussians", file);
+    if (object.hinge && first) settings.add("joint", hinge_of(object, *first));
+    data.add("objects", object_config_of(object.name, std::move(settings)));
   }
   add_file(data, "avatar", "avatar.safetensors");
   if (has_surface) add_file(data, "surface", kSurfaceFile);
@@ -95,8 +107,11 @@ ConfigValue clip_data(const fs::path& folder, SyntheticVideo video) {
 fs::path folder_of(Index clip, Index clips) { return clips == 1 ? fs::path() : fs::path("clips") / clip_name(clip); }
 
 /// The sections that name the dataset's files.
-ConfigValue data_sections(const SyntheticObject& object, const SyntheticSettings& settings, bool has_surface) {
-  ConfigValue shared = shared_data(object, has_surface);
+/// @param first  where the object is in frame 0
+ConfigValue data_sections(const SyntheticObject& object, const std::optional<Rigid<double>>& first,
+                          const SyntheticSettings& settings, bool has_surface) {
+  const bool is_chain = settings.clips > 1;  // whose objects move freely
+  ConfigValue shared = shared_data(object, is_chain ? std::nullopt : first, has_surface);
   if (settings.clips == 1) return object_config_of("data", merged(std::move(shared), clip_data({}, settings.video)));
   ConfigValue sections = object_config_of("data", std::move(shared)), chain = ConfigValue::make_array();
   for (Index k = 0; k < settings.clips; ++k) {
@@ -106,6 +121,10 @@ ConfigValue data_sections(const SyntheticObject& object, const SyntheticSettings
   }
   sections.add("chain", std::move(chain));
   return sections;
+}
+
+std::optional<Rigid<double>> first_of(const std::vector<Rigid<double>>& poses) {
+  return poses.empty() ? std::nullopt : std::optional(poses.front());
 }
 
 void write_objects(const std::string& path, const std::string& name, const std::vector<Rigid<double>>& poses) {
@@ -272,7 +291,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_text_file(out.file(kSyntheticFile), synthetic_settings_json(settings, body_settings));
   const TriangleMesh solids = synthetic_solids(settings, whole.plan);
   if (!solids.faces.empty()) write_mesh(out.file(kSurfaceFile), solids);
-  const ConfigValue data = data_sections(object, settings, !solids.faces.empty());
+  const ConfigValue data = data_sections(object, first_of(whole.object), settings, !solids.faces.empty());
   write_text_file(out.file("config.json"), to_json(merged(data, more_sections)));
 
   const std::vector<SyntheticClip> clips =

@@ -1,4 +1,4 @@
-// Motions on the spot, from keyframes: pour, lift, sit, lean, wave.
+// Motions on the spot, from keyframes: pour, lift, sit, lean, wave, open.
 //
 // Before an effort there is a key that goes the other way
 // (the knees give before something is lifted, the trunk leans forward before one sits).
@@ -150,6 +150,27 @@ KeyedMotion wave_motion(const Vector& carried) {
   return motion;
 }
 
+/// The object turns about its hinge, and pulls and pushes the right hand along.
+KeyedMotion open_motion() {
+  const Vector hinge(0.42, 0.5, 0);
+  const auto at = [&hinge](double seconds, const Vector& pelvis, const Vector& pelvis_turn, const Vector& spine,
+                           const Vector& head, double opened_deg, const HandKey& left) {
+    return holding(seconds, pelvis, pelvis_turn, spine, head, hinge, {0, 0, opened_deg - 20}, 64, left);
+  };
+  KeyedMotion motion;
+  motion.ground = {{0.25, 0.85}, -40};
+  motion.feet = {planted_foot(0.12, 0.1, 10), planted_foot(-0.13, -0.1, -14)};
+  motion.keys = {
+      at(0, {0, -0.02, -0.02}, {2, -4, 0}, {4, -4, 0}, {14, 4, 0}, 0, {{0, 0.02, 0}, {0, 0, 0}, 24}),
+      // the weight goes back before it goes forward
+      at(0.35, {0, -0.045, -0.03}, {1, -5, 0}, {2, -5, 0}, {15, 4, 0}, 0.5, {{0, 0.03, 0}, {0, 0, 0}, 24}),
+      at(1.6, {0.01, 0.03, -0.03}, {6, 4, 0}, {9, 6, 0}, {8, 4, 0}, 26, {{0.02, -0.02, 0.01}, {0, 0, 0}, 26}),
+      at(2.5, {0.02, 0.07, -0.045}, {9, 9, 0}, {13, 11, 0}, {2, 2, 0}, 42, {{0.03, -0.05, 0.02}, {0, 0, 0}, 26}),
+      at(kClipSeconds, {0.02, 0.08, -0.05}, {10, 10, 0}, {14, 12, 0}, {0, 0, 0}, 45,
+         {{0.03, -0.05, 0.02}, {0, 0, 0}, 26})};
+  return motion;
+}
+
 /// The waving hand: raised from where it hangs, then from side to side with the forearm and the wrist after it.
 void wave_hand(const Actor& actor, const Ground& ground, double t, FigureHand& hand) {
   const double raised = smooth_step((t - 0.2) / 0.75) * (1 - 0.75 * smooth_step((t - 2.2) / 0.75));
@@ -190,6 +211,8 @@ KeyedMotion motion_of(const Actor& actor) {
       return lean_motion(object.exists(), ground_to_grip);
     case SyntheticMotionKind::kWave:
       return wave_motion(object.carried);
+    case SyntheticMotionKind::kOpen:
+      return open_motion();
     default:
       return pour_motion();
   }
@@ -213,10 +236,11 @@ Moment keyed_moment(const Actor& actor, double seconds) {
   if (actor.motion == SyntheticMotionKind::kWave) wave_hand(actor, ground, t, figure.hands[kLeft]);
   if (!actor.object.exists()) return moment;
   const bool sits = actor.motion == SyntheticMotionKind::kSit;
-  const ObjectPlace at{actor.object.grip + (sits ? Vector(kChairBack, 0, 0) : Vector(0, 0, 0)), key.object,
-                       key.object_turn};
+  const Vector pivot = actor.object.grip + (sits ? Vector(kChairBack, 0, 0) : Vector(0, 0, 0));
+  const ObjectPlace at{actor.object.hinge.value_or(pivot), key.object, key.object_turn};
   moment.object = object_on(ground, at);
-  const bool is_free = sits || actor.motion == SyntheticMotionKind::kLean || actor.object.is_heavy;
+  const bool is_free =
+      sits || actor.motion == SyntheticMotionKind::kLean || actor.object.is_heavy || actor.object.hinge.has_value();
   moment.in_hand = !is_free && key.away.norm() == 0;
   if (!sits) hold_object(actor, at, key.away, key.grip, moment);
   return moment;

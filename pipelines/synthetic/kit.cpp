@@ -230,9 +230,22 @@ void SceneKit::add_stand() {
   tube(at(-0.19, 0.11, 0.01), at(0.19, 0.11, 0.01), 0.009, steel, 2);
 }
 
+void SceneKit::add_posts() {
+  constexpr double kHalf = 0.035, kHigh = 1.25, kGap = 0.05, kGate = 0.6;
+  // Across the gate's middle way: it swings from one side to the other.
+  const Point along = so3_exp(Point(0, 0, plan.support_turn + 20 * kDegree)) * Point::UnitY();
+  for (const double way : {kGap, -kGate - kGap}) {
+    const Point foot = plan.support + way * along;
+    model.add_box(
+        Point(foot.x(), foot.y(), kHigh / 2), Point(kHalf, kHalf, kHigh / 2), plan.support_turn,
+        [&](int) { return wood(Rgb(0.5, 0.36, 0.24), 2 * kHalf, kHigh); }, 1.5);
+  }
+}
+
 void SceneKit::add_support() {
   if (plan.has_table) add_table();
   if (plan.has_stand) add_stand();
+  if (plan.has_posts) add_posts();
 }
 
 }  // namespace hsi4d::detail

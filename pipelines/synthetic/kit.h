@@ -72,12 +72,13 @@ class SceneKit {
   void add_window(double left, double right, double low, double high);
   void add_curtain(double left, double right, double low, double high, const Rgb& bottom, const Rgb& top);
   void add_plant(const Point& foot, double size = 1);
-  /// What the plan asks for: a table, a stand, or nothing.
+  /// What the plan asks for: a table, a stand, posts, or nothing.
   void add_support();
 
  private:
   void add_table();
   void add_stand();
+  void add_posts();
 
   SmoothNoise noise_;
 };

@@ -58,7 +58,7 @@ inline constexpr double kSeatToPelvis = 0.085, kPalmToSurface = 0.06;
 /// 0 below 0, 1 above 1, smooth between.
 double smooth_step(double x);
 
-/// pour, lift, sit, lean, wave. Feet stay where they stand.
+/// pour, lift, sit, lean, wave, open. Feet stay where they stand.
 Moment keyed_moment(const Actor& actor, double seconds);
 
 /// walk, push.

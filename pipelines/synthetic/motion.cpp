@@ -54,6 +54,11 @@ ScenePlan plan_of(const Moment& first, const SyntheticObject& object, SyntheticM
       motion == SyntheticMotionKind::kPour || (motion == SyntheticMotionKind::kLift && !object.is_heavy);
   plan.has_table = stands && !object.on_floor;
   plan.has_stand = stands && object.on_floor;
+  if (object.hinge) {
+    plan.has_posts = true;
+    plan.support = transform_point(*first.object, *object.hinge);
+    plan.support_turn = so3_log(first.object->rotation)[2];
+  }
   if (!stands) return plan;
   const Ground& ground = first.figure.ground;
   const Vector foot = first.object->translation - Vector(0, 0, object.above_ground);
@@ -137,6 +142,7 @@ Viewpoint designed_viewpoint(const ClipSettings& settings) {
   if (motion == SyntheticMotionKind::kRoll) return {{0.5, -2.5, 1.3}, {0.0, 0.55, 0.72}, 1.2};
   if (motion == SyntheticMotionKind::kWalk) return {{0.5, -2.5, 1.4}, {0.02, 0.5, 0.85}, 1.2};
   if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.5, 1.5}, {0, 0.35, 0.72}, 1.25};
+  if (motion == SyntheticMotionKind::kOpen) return {{0.45, -2.2, 1.5}, {0, 0.6, 0.8}, 1.2};
   if (motion == SyntheticMotionKind::kWave) return {{0.45, -1.95, 1.4}, {0.05, 0.7, 0.9}, 1.15};
   return {{0.42, -1.56, 1.36}, {0.02, 0.72, 0.85}, 1.12};
 }
@@ -326,6 +332,8 @@ const char* motion_summary(SyntheticMotionKind motion) {
       return "waters flowers with it";
     case SyntheticMotionKind::kRoll:
       return "sits on it and rolls backwards";
+    case SyntheticMotionKind::kOpen:
+      return "opens it, the right hand on its handle";
     case SyntheticMotionKind::kWave:
       break;
   }

@@ -272,6 +272,10 @@ Hold hold_of(SyntheticObjectKind kind) {
     case SyntheticObjectKind::kMower:
       return held_bar(Point(kMowerHandle[0], 0, kMowerHandle[1]), 0.15, Point(0.9, 0, -std::sqrt(1 - 0.81)),
                       Point(0, 0.42, kMowerHandle[1]));
+    case SyntheticObjectKind::kGate: {  // the fist around its upright handle
+      const Point bar(kGateHandle[0], kGateHandle[1], kGateHandle[2]);
+      return {bar, {std::nullopt, HandGrip{bar, Point::UnitZ(), Point::UnitX()}}, Point::Zero(), true};
+    }
     case SyntheticObjectKind::kWateringCan:
     case SyntheticObjectKind::kNone:
       break;
@@ -297,6 +301,8 @@ void add_kind(SurfaceModel& model, SyntheticObjectKind kind) {
       return add_shopping_cart(model);
     case SyntheticObjectKind::kMower:
       return add_mower(model);
+    case SyntheticObjectKind::kGate:
+      return add_gate(model);
     case SyntheticObjectKind::kNone:
       break;
   }
@@ -326,6 +332,7 @@ SyntheticObject object_of(std::string name, Gaussians gaussians, const Hold& hol
   object.above_ground = centroid.z();
   object.carried = hold.carried;
   object.on_floor = hold.on_floor;
+  if (kind == SyntheticObjectKind::kGate) object.hinge = Point(0, kGateHinge, 0) - centroid;
   object.is_heavy = kind == SyntheticObjectKind::kBarbell;
   object.is_long = kind == SyntheticObjectKind::kShoppingCart || kind == SyntheticObjectKind::kMower;
   return object;
@@ -417,6 +424,8 @@ const char* object_summary(SyntheticObjectKind kind) {
       return "a shopping cart, pushed by its handle";
     case SyntheticObjectKind::kMower:
       return "a lawn mower with a bag, pushed by its handle";
+    case SyntheticObjectKind::kGate:
+      return "a garden gate on its hinge, held by its handle";
     case SyntheticObjectKind::kNone:
       break;
   }

@@ -31,7 +31,9 @@ struct SyntheticObject {
   bool has_normals = true;           ///< the third axis of each Gaussian is its outward normal, as of made ones
   bool on_floor = false;             ///< it stands on the floor, not on a table
   bool is_long = false;              ///< it is pushed along a wider circle
-  bool is_heavy = false;             ///< a weight, lifted with both hands from where it lies; needs no stand
+  std::optional<Vector3<double>> hinge = {};  ///< a point of the vertical axis that it turns about, on the ground it
+                                              ///< stands on; none: it moves freely
+  bool is_heavy = false;                      ///< a weight, lifted with both hands from where it lies; needs no stand
 
   bool exists() const { return gaussians.count() > 0; }
 };

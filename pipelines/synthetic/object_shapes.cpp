@@ -145,4 +145,37 @@ void add_mower(SurfaceModel& model) {
   bar(model, handle + Point(0.12, -0.21, -0.12), handle + Point(0.12, 0.21, -0.12), 0.008, Rgb(0.8, 0.15, 0.1), 1.4);
 }
 
+void add_gate(SurfaceModel& model) {
+  constexpr double kHigh = 1.15, kThick = 0.012;
+  constexpr int kSlats = 5;
+  const Rgb teal(0.13, 0.45, 0.47), cream(0.9, 0.86, 0.74), rust(0.74, 0.36, 0.2);
+  const double wide = 2 * kGateHinge / kSlats;
+  for (int i = 0; i < kSlats; ++i) {
+    const double y = kGateHinge - (i + 0.5) * wide, high = kHigh - 0.02 * std::abs(i - 2);
+    const Rgb color = i % 2 == 0 ? teal : Rgb(teal * 1.35);
+    const Paint boards = [=](double u, double v) {
+      if (v > 0.93) return cream;
+      const double grain = 0.1 * std::sin(23 * v + 5 * i) + 0.06 * std::sin(61 * u + 9 * v);
+      return Rgb(color * (1 + grain));
+    };
+    model.add_box(
+        Point(0, y, 0.01 + high / 2), Point(kThick, 0.44 * wide, high / 2), 0, [&](int) { return boards; }, 1.2, 0,
+        true);
+  }
+  for (const double side : {-1.0, 1.0}) {  // rails, and a brace between them
+    const double x = side * 1.9 * kThick;
+    for (const double z : {0.22, 0.9})
+      model.add_box(
+          Point(x, 0, z), Point(0.9 * kThick, kGateHinge, 0.045), 0,
+          [&](int) {
+            return [=](double u, double) { return std::abs(std::remainder(u * 6, 1.0)) < 0.12 ? cream : rust; };
+          },
+          1.2, 0, true);
+    bar(model, {x, kGateHinge - 0.03, 0.26}, {x, -kGateHinge + 0.03, 0.86}, 0.022, rust, 1.2);
+  }
+  const double x = kGateHandle[0], y = kGateHandle[1], z = kGateHandle[2];
+  bar(model, {x, y, z - 0.1}, {x, y, z + 0.1}, 0.012, kCanSteel, 1.4);
+  for (const double end : {-0.1, 0.1}) bar(model, {x, y, z + end}, {0, y, z + end}, 0.01, kCanSteel);
+}
+
 }  // namespace hsi4d::detail

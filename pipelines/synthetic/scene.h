@@ -16,6 +16,7 @@ struct ScenePlan {
   double support_turn = 0;                     ///< about z, radians
   bool has_table = true;                       ///< the support is a table
   bool has_stand = false;                      ///< it is a stand on the floor
+  bool has_posts = false;                      ///< it is the foot of the hinge of a gate between two posts
   Vector2<double> middle{0, 0.6};              ///< where the person acts
   double seen_from_y = 0.2;                    ///< the cameras see the floor from here on
   const ScenePlace* place = nullptr;           ///< of the scene, which the person acts at; none: in the middle

@@ -445,7 +445,8 @@ TEST_CASE("a registered loss term says whether it needs the body or objects") {
                          [&some](LossInput need) { return std::find(some.begin(), some.end(), need) != some.end(); });
     };
     CHECK((term.record(no_body).tape == nullptr) ==
-          needs_one_of({LossInput::kPose, LossInput::kMotion, LossInput::kObjectMotion, LossInput::kBodyVertices}));
+          needs_one_of({LossInput::kPose, LossInput::kMotion, LossInput::kObjectMotion, LossInput::kContacts,
+                        LossInput::kBodyVertices}));
     CHECK((term.record(no_objects).tape == nullptr) ==
           needs_one_of({LossInput::kObjectDepth, LossInput::kObjectOpacity}));
   }

@@ -96,8 +96,9 @@ TEST_CASE("a loss that cannot be prepared is told with its place, unless it is o
 
 TEST_CASE("losses that need what a stage does not have are named, unless they are off") {
   StageSettings stage;
-  for (const char* name : {"photometric", "masked_l2", "center", "depth", "mask", "fit", "contact", "smooth",
-                           "object_smooth", "ground", "foot_sliding", "penetration", "joint_limits", "pose_prior"})
+  for (const char* name :
+       {"photometric", "masked_l2", "center", "depth", "mask", "fit", "contact", "annotated_contact", "smooth",
+        "object_smooth", "ground", "foot_sliding", "penetration", "joint_limits", "pose_prior"})
     stage.losses.emplace_back(name, default_settings(term_named(name).description));
   std::string text;
   for (const LossFault& fault : losses_without_inputs(stage, kImageInputs, "a picture"))
@@ -108,6 +109,7 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
         "/losses/mask: this loss needs the body in an image, which a picture does not have\n"
         "/losses/fit: this loss needs the body, which a picture does not have\n"
         "/losses/contact: this loss needs the body, which a picture does not have\n"
+        "/losses/annotated_contact: this loss needs the body, which a picture does not have\n"
         "/losses/smooth: this loss needs the body, which a picture does not have\n"
         "/losses/object_smooth: this loss needs the body, which a picture does not have\n"
         "/losses/ground: this loss needs the body, which a picture does not have\n"

@@ -1,6 +1,7 @@
 #include "optim/stage.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,6 +10,7 @@
 #include <catch2/catch.hpp>
 
 #include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
@@ -176,6 +178,40 @@ TEMPLATE_TEST_CASE("a stage keeps parameters in their range, from where they com
   CHECK(last(S(0.5)) == Approx(0.5).margin(0.01));
   CHECK(last(S(-4)) == Approx(0.5).margin(0.01));
   CHECK(last(S(1.5)) == Approx(0.5).margin(0.01));
+}
+
+TEST_CASE("blocks of a group may have ranges of their own, or none") {
+  Tape<double> tape;
+  const Var<double> x = tape.parameter("x", kScalarShape), y = tape.parameter("y", kScalarShape),
+                    z = tape.parameter("z", kScalarShape);
+  LossInputs<double> inputs;
+  inputs.rendered = concat_cols<double>(std::array{x, y, z});
+  inputs.target = tape.constant("target", shape_of(1, 3));
+  tape.set(inputs.target, {2.0, 2.0, 2.0});
+  ParameterGroup<double> group{"x", {x, y, z}};
+  CHECK_FALSE(group.has_range());
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  const std::array ranges = {ParameterRange{0, 0.5}, ParameterRange{-kAny, kAny}, ParameterRange{-1, 0.25}};
+  group.block_ranges = ranges;
+  CHECK(group.has_range());
+  CHECK(group.range_of(2)->high == 0.25);
+  group.block_ranges = std::span(ranges).subspan(1, 1);
+  CHECK_FALSE(group.has_range());
+  group.block_ranges = ranges;
+  const std::vector<LossTerm> terms = {
+      make_loss_term("distance", "To the target", [](const auto& in) { return sum(square(in.rendered - in.target)); })};
+  StageSettings settings;
+  settings.iterations = 200;
+  settings.optimize = {{"x", moving(0.05)}};
+  settings.losses = {{"distance", weighted(1)}};
+  for (const OptimizerKind kind : {OptimizerKind::kAdam, OptimizerKind::kLm}) {
+    for (const Var<double> block : group.blocks) tape.set(block, {0.0});
+    settings.optimizer.kind = kind;
+    run_stage<double>(tape, settings, terms, inputs, {group});
+    CHECK(tape.value(x).scalar() == Approx(0.5).epsilon(1e-9));
+    CHECK(tape.value(y).scalar() == Approx(2).margin(0.02));
+    CHECK(tape.value(z).scalar() == Approx(0.25).epsilon(1e-9));
+  }
 }
 
 TEMPLATE_TEST_CASE("a stage makes its loss small and leaves the tape as it was", "", float, double) {

@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "body/body_model.h"
 #include "core/random.h"
 #include "optim/motion_start.h"
 #include "tests/optim/solid/surface_of_test.h"
@@ -58,6 +59,16 @@ struct MotionOfTest {
                                          {Matrix3<double>::Identity(), {3, 0, 0}}});
     }
     start.first_body = shifted(0);
+    start.contacts = {{.frame = 2, .joints = {smplx_joint("right_wrist")}, .object = 0},
+                      {.frame = 2,
+                       .joints = {smplx_joint("left_foot"), smplx_joint("left_ankle")},
+                       .place = Vector3<double>(0.01, 0.02, -0.2),
+                       .weight = 0.5},
+                      {.frame = 4,
+                       .joints = {smplx_joint("head")},
+                       .object = 1,
+                       .place = Vector3<double>(-0.02, 0.01, 0.03),
+                       .weight = 2}};
   }
   /// All joints at the same place.
   static PosedJoints shifted(double x) {

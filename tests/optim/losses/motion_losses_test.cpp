@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/parallel.h"
+#include "core/text.h"
 #include "tests/support/loss_terms.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/test_motion.h"
@@ -144,6 +145,88 @@ TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain 
         motion_loss("contact", settings, no_joint, [&](const BodyPoint& p) { return test.start.place(p); });
     CHECK(loss == Approx(expected).epsilon(1e-12));
   }
+}
+
+TEST_CASE("annotated_contact draws parts of the body to what they are said to touch, by plain search") {
+  const MotionOfTest& test = motion_of_test();
+  const auto part = [&test](const AnnotatedContact& contact) {
+    std::vector<BodyPoint> points;
+    for (Index row = 0; row < kVertexRows; ++row) {  // of a vertex the first joint weighs most
+      const Index joint = row % kSmplxJoints;
+      if (std::count(contact.joints.begin(), contact.joints.end(), joint) > 0)
+        points.push_back({contact.frame, row, BodySet::kVertices});
+    }
+    return points;
+  };
+  std::vector<double> of_frame(kFrames), counts(kFrames);
+  for (const AnnotatedContact& contact : *test.start.contacts) {
+    std::vector<Vector3<double>> touched;
+    const auto frame = static_cast<std::size_t>(contact.frame);
+    if (!contact.object) {
+      touched = {*contact.place};
+    } else if (contact.place) {
+      const auto& pose = test.start.world_from_object[frame][static_cast<std::size_t>(*contact.object)];
+      touched = {transform_point(pose, *contact.place)};
+    } else {
+      for (Index g = 0; g < kObjectRows; ++g)
+        touched.push_back(test.start.place(ObjectPoint{contact.frame, *contact.object, g}));
+    }
+    double least = 1e9;
+    for (const BodyPoint& point : part(contact)) {
+      for (const Vector3<double>& place : touched) least = std::min(least, (test.start.place(point) - place).norm());
+    }
+    of_frame[frame] += contact.weight * least * least;
+    counts[frame] += 1;
+  }
+  double expected = 0;
+  for (std::size_t t = kStill; t < kFrames; ++t)
+    expected += counts[t] == 0 ? 0 : of_frame[t] / counts[t] / static_cast<double>(kFrames - kStill);
+  CHECK(expected > 1);  // the second object is 3 m away
+  const double loss =
+      motion_loss("annotated_contact", "{}", no_joint, [&](const BodyPoint& p) { return test.start.place(p); });
+  CHECK(loss == Approx(expected).epsilon(1e-12));
+}
+
+TEST_CASE("annotated_contact goes on with the points that were nearest, and is 0 where nothing is said") {
+  MotionStart start = motion_of_test().start;
+  start.contacts = {{.frame = kStill, .joints = {}, .vertex = 7, .place = Vector3<double>(0.1, 0.2, 0.3)}};
+  const auto loss_of = [&start](const Vector3<double>& place, std::vector<LossNote>& notes) {
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&start, [](const MotionStart*) {});
+    inputs.notes = &notes;
+    inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+    inputs.body_points = [&](const std::vector<BodyPoint>& points) {
+      REQUIRE(points.size() == 1);
+      CHECK(points[0].row == 7);
+      CHECK(points[0].of == BodySet::kVertices);
+      const Var<double> var = tape.parameter("body", shape_of(1, 3));
+      std::copy_n(place.data(), 3, tape.write(var).row(0));
+      return var;
+    };
+    const Var<double> loss = record_term("annotated_contact", inputs, "{}");
+    REQUIRE(loss.tape != nullptr);
+    tape.forward(loss);
+    tape.backward(loss);
+    CHECK(tape.gradient(inputs.joints)(0, 0) == 0);
+    return tape.value(loss).scalar();
+  };
+  std::vector<LossNote> notes;
+  CHECK(loss_of({0.1, 0.2, 0.3}, notes) == 0);
+  CHECK(loss_of({0.4, 0.2, 0.7}, notes) == Approx(0.25 / static_cast<double>(kFrames - kStill)));
+  REQUIRE(notes.size() == 2);
+  const double away = (start.place(BodyPoint{kStill, 7, BodySet::kVertices}) - Vector3<double>(0.1, 0.2, 0.3)).norm();
+  CHECK(notes[0].text == "1 contact, " + rounded(1000 * away, 3) + " mm apart");
+  CHECK_FALSE(notes[0].is_idle);
+  start.contacts->clear();
+  CHECK(loss_of({0, 0, 0}, notes) == 0);
+  CHECK(notes.size() == 2);
+  start.contacts.reset();  // nobody annotated any: the term is off
+  LossInputs<double> inputs;
+  Tape<double> tape;
+  inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+  inputs.motion = std::shared_ptr<const MotionStart>(&start, [](const MotionStart*) {});
+  CHECK(record_term("annotated_contact", inputs, "{}").tape == nullptr);
 }
 
 TEST_CASE("of Gaussians at the same distance contact takes the same ones each time, the first object's (row D6)") {

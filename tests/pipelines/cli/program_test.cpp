@@ -123,7 +123,8 @@ TEST_CASE("check refuses stages whose groups are not known, do not exist in what
              "losses": {"photometric": {}}},
     "none": {"iterations": 5, "optimize": {}}}})");
   const std::string groups =
-      "camera, object_orient, object_transl, transl, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, "
+      "camera, object_orient, object_transl, object_joint, transl, global_orient, body_pose, jaw_pose, leye_pose, "
+      "reye_pose, "
       "left_hand_pose, right_hand_pose, color_net, avatar_features";
   const ProgramResult result = run_hsi4d({"check", "a.json"});
   CHECK(result.status == 2);

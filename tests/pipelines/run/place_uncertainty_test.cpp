@@ -36,8 +36,8 @@ PlaceSigmas sigmas_at_start(const StageInputs& inputs) {
   Tape<double> tape;
   const auto [graph, losses] =
       record_frame<double>(tape, inputs.task(), inputs.frame_task(), inputs.start, inputs.colors(), std::nullopt);
-  return place_sigmas<double>(tape, inputs.task(), graph->groups(), losses, foreground_of(inputs.picture),
-                              inputs.start.camera_from_world.rotation);
+  return place_sigmas<double>(tape, inputs.task(), graph->groups(), losses, graph->object_places(),
+                              foreground_of(inputs.picture), inputs.start.camera_from_world.rotation);
 }
 
 Image drawn(const StageInputs& inputs, const SceneState& state) {

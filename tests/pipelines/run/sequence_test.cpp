@@ -249,10 +249,9 @@ TEST_CASE("contact draws vertices of the body that the avatar was made on, else 
   const RunConfig taller = refined_config({"body.shape=[3]"});
   CHECK_FALSE(read_run_clip(taller, loss_terms()).body);
   execute_tiny(taller, "taller");
-  CHECK_THAT(
-      file_text("taller/log.txt"),
-      Contains("/stages/refinement/losses/contact/points: the avatar's Gaussians stand for the vertices of `body`: "
-               "joints of the avatar are "));
+  CHECK_THAT(file_text("taller/log.txt"),
+             Contains("/stages/refinement/losses/contact: the avatar's Gaussians stand for the vertices of `body`: "
+                      "joints of the avatar are "));
 }
 
 TEST_CASE("a stage over the sequence that leaves the body where it was is told", "[run][sequence]") {
