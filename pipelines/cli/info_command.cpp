@@ -286,7 +286,7 @@ std::string info_command(const std::string& path, bool json) {
   }
   const std::vector<std::string> known = info_endings();
   throw UserError("hsi4d info: " + path + ": nothing is known of files that end in \"" + ending +
-                  "\"; allowed: " + joined(known) + did_you_mean(ending, known));
+                  "\"; allowed: " + joined(known) + " and videos: " + video_endings() + did_you_mean(ending, known));
 }
 
 void add_info(CLI::App& app, Program& program) {
