@@ -19,6 +19,7 @@
 #include "core/lens.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/first_state.h"
