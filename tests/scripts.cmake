@@ -47,6 +47,13 @@ if(HSI4D_PYTHON3)
                    $<TARGET_FILE:hsi4d>)
   add_test(NAME "embeddings by CLIP"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/clip_embeddings_test.py ${PROJECT_SOURCE_DIR}/tools)
+  add_test(NAME "keypoints of SAM 3D Body"
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/export_keypoints_test.py ${PROJECT_SOURCE_DIR}/tools
+                   $<TARGET_FILE:hsi4d>)
+  set_tests_properties("keypoints of SAM 3D Body" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+  add_test(NAME "runs in MLflow's files"
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/export_runs_test.py ${PROJECT_SOURCE_DIR}/tools)
+  set_tests_properties("runs in MLflow's files" PROPERTIES LABELS quick)
   add_test(NAME "services for video, masks and poses"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "the gate of time and error"
