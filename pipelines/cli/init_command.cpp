@@ -92,7 +92,7 @@ Lens lens_of(const InitArguments& a, const Camera& images) {
   const Lens lens{.k1 = a.lens_k1.value_or(0)};
   if (!covers_picture(lens, images))
     throw UserError(kInitCommand + "--lens-k1 is " + number_text(lens.k1) +
-                    ": such a lens shows no place of the picture's edges (" + size_text(images) + ", focal length " +
+                    ": such a lens turns back before an edge of the picture (" + size_text(images) + ", focal length " +
                     number_text(images.fx) + " px); allowed: numbers nearer to 0");
   return lens;
 }
@@ -198,9 +198,10 @@ void check_options(const InitArguments& a) {
   check_range(a.camera_height, kInitCommand + "--camera-height", 0.1, 100);
   check_range(a.lens_k1, kInitCommand + "--lens-k1", -10, 10);
   check_range(a.longest_side_px, kInitCommand + "--longest-side-px", 64, 4096);
-  if (!a.camera.empty() && (a.focal_px || a.camera_height))
+  if (!(a.camera.empty() && a.scene.empty()) && (a.focal_px || a.camera_height))
     throw UserError(kInitCommand +
-                    "--camera says the focal length and the height; leave out --focal-px and --camera-height");
+                    "the camera in a scene, or of --camera, has a focal length and a height; leave out --focal-px and "
+                    "--camera-height");
   if (!a.scene.empty() && a.camera.empty() && !a.check)
     throw UserError(kInitCommand +
                     "--scene needs --camera: where the camera of frame 0 is in it, as hsi4d locate says");
@@ -248,7 +249,8 @@ std::string write_footage(const InitArguments& a, const std::vector<LossDescript
 std::string check_footage(const InitArguments& a, const std::vector<LossDescription>& losses) {
   const FrameSource frames(a.video,
                            {a.video_rate.value_or(0), a.frame_rate.value_or(0), "--video-rate", "--frame-rate"});
-  lens_of(a, camera_of_images(a, frames));
+  const bool is_to_be_located = !a.scene.empty() && a.camera.empty();
+  if (!is_to_be_located) lens_of(a, camera_of_images(a, frames));
   if (!a.avatar.empty()) read_person(a.avatar);
   if (!a.scene.empty()) read_drawn(a.scene, shipped_config(losses).render);
   return video_info(a.video, a.video_rate, a.frame_rate);
@@ -293,7 +295,8 @@ void add_init(CLI::App& app, Program& program) {
                   "Of the images that are compared; default: 512, or the camera's")
       ->type_name("N");
   add_threads(command, a.threads);
-  command.add_flag("--check", a.check, "Look at options, video and files, before keypoints and masks are there");
+  command.add_flag("--check", a.check,
+                   "Look at options, video and files before keypoints and masks, and the camera in a scene, are there");
   command.add_option("--out", a.out, "Where to: a new or empty folder")->type_name("DIR")->required();
   run_when_chosen(command, program, [&] { return init_command(a, descriptions_of(program.terms)); });
 }

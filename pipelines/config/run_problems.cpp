@@ -90,7 +90,8 @@ void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunP
                        {place(name), place(latest->first)}});
       continue;
     }
-    if (latest == nullptr && stage.over == StageScope::kSequence)
+    const bool is_first = latest == nullptr || (has_frames && latest->second.over == StageScope::kFirst);
+    if (is_first && stage.over == StageScope::kSequence)
       found.push_back({place(name), "a stage over the sequence needs one over frames before it", {place(name)}});
     latest = &entry;
   }

@@ -229,8 +229,9 @@ std::string off_text(const std::vector<std::string>& losses) {
 
 void check_lens(const Lens& lens, const Camera& camera) {
   if (!covers_picture(lens, camera))
-    throw UserError("/data/lens: such a lens shows no place of the picture's edges (" + size_text(camera) +
-                    ", focal length " + number_text(camera.fx) + " px); allowed: numbers nearer to 0");
+    throw UserError("/data/lens: such a lens turns back before an edge of the picture (" + size_text(camera) +
+                    ", focal length " + number_text(camera.fx) +
+                    " px); allowed: those that show the middles of all edges");
 }
 
 }  // namespace

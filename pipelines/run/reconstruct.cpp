@@ -423,6 +423,7 @@ class Reconstruction {
   /// @param l, end  of the later stages
   void go_through_again(std::size_t l, std::size_t end) {
     ++pass_;
+    tracks_ = {};
     if (progress_.later.size() == l) progress_.later.resize(end, {{states_before(l).front()}, {}});
     for (Index t = std::ssize(progress_.later[l].states); t < clip_.frames(); ++t) run_frame_again(t, l, end);
     if (moves_colors(l, end)) colors_pass_ = pass_;
@@ -530,9 +531,9 @@ class Reconstruction {
     };
     const SceneState before = state;
     const bool is_asked = s == surest_stage_ && frame.index > 0;
-    const StageResult result = run_frame_stage({config_, clip_, losses_, s, observer_.stages,
-                                                pass_ == 1 ? &tracks_ : nullptr, found, is_asked ? &sigmas_ : nullptr},
-                                               frame, state, colors, note_iteration);
+    const StageResult result =
+        run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found, is_asked ? &sigmas_ : nullptr},
+                        frame, state, colors, note_iteration);
     drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
@@ -682,7 +683,7 @@ class Reconstruction {
   int pass_ = 1;         // through the frames, the one at hand
   int colors_pass_ = 1;  // the last whole one that moved the color net
   RunProgress progress_;
-  TrackPoints tracks_;                       // of the frames that are done
+  TrackPoints tracks_;                       // of the frames that are done, in this pass
   PlaceSigmas sigmas_;                       // of the frame at hand
   std::optional<std::size_t> surest_stage_;  // which tells them
   const ColorState start_colors_;

@@ -252,6 +252,9 @@ TEST_CASE("hsi4d init --check looks at what is there before keypoints and masks 
   CHECK_THAT(check({"--lens-k1", "-9"}), Contains("2 ") && Contains("--lens-k1 is -9"));
   CHECK_THAT(check({"--avatar", "none.safetensors"}), Contains("2 ") && Contains("none.safetensors"));
   CHECK_THAT(check({"--scene", "none.ply"}), Contains("2 ") && Contains("none.ply"));
+  const std::string scene = (TinyDataset::folder() / "scene.ply").string();
+  CHECK_THAT(check({"--scene", scene}), Contains("0 " + footage.frames));  // its camera is found later
+  CHECK_THAT(check({"--scene", scene, "--focal-px", "500"}), Contains("2 ") && Contains("leave out --focal-px"));
   CHECK_THAT(check({"--frame-rate", "1000"}), Contains("2 ") && Contains("frame"));
 }
 
@@ -267,8 +270,8 @@ TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {
   CHECK_THAT(error({"--focal-px", "-3"}), Contains("hsi4d init: --focal-px: -3 is out of range; allowed: 1 to "));
   CHECK_THAT(error({"--camera-height", "0"}), Contains("--camera-height: 0 is out of range"));
   CHECK_THAT(error({"--lens-k1", "11"}), Contains("--lens-k1: 11 is out of range; allowed: -10 to 10"));
-  CHECK_THAT(error({"--lens-k1", "-9"}), Contains("hsi4d init: --lens-k1 is -9: such a lens shows no place of the "
-                                                  "picture's edges"));
+  CHECK_THAT(error({"--lens-k1", "-9"}), Contains("hsi4d init: --lens-k1 is -9: such a lens turns back before an "
+                                                  "edge of the picture"));
   CHECK_THAT(error({"--longest-side-px", "8"}), Contains("--longest-side-px: 8 is out of range; allowed: 64 to 4096"));
   CHECK_THAT(error({"--frame-rate", "-1"}), Contains("--frame-rate: -1"));
   const std::string camera = (TinyDataset::folder() / "camera.json").string();

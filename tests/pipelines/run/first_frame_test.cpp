@@ -260,6 +260,8 @@ TEST_CASE("scopes of stages have an order, and frames need stages of their own",
         "/stages/c/over: a stage over the first frame cannot come after \"b\", which is over the sequence\n");
   CHECK(problems_of({Scope::kSequence}) ==
         "/stages/a/over: a stage over the sequence needs one over frames before it\n");
+  CHECK(problems_of({Scope::kFirst, Scope::kSequence, Scope::kFrame}) ==
+        "/stages/b/over: a stage over the sequence needs one over frames before it\n");
   CHECK(problems_of({Scope::kFirst}) ==
         "/stages/a/over: a stage over the first frame needs one over frames after it\n");
   CHECK(problems_of({Scope::kFirst, Scope::kSequence}) ==
