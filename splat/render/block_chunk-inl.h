@@ -283,11 +283,12 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
   const std::span<const TileEntry> entries = chunk.entries;
   const size_t size = entries.size();
   constexpr size_t kAhead = 12;
+  constexpr bool kInRecords = kChannels > 0 && kChannels <= RecordFeatures<float>::kCount;
   for (size_t at = 0; at < size; ++at) {
     if (at + kAhead < size && (entries[at + kAhead].blocks & blocks) != 0) {
       const auto next = entries[at + kAhead].index;
       hwy::Prefetch(&scene.records[static_cast<size_t>(next)]);  // one cache line
-      hwy::Prefetch(scene.feature(next));
+      if (!kInRecords) hwy::Prefetch(scene.feature(next));
     }
     const std::uint32_t touched = entries[at].blocks & blocks;
     space.blocks[at] = static_cast<std::int32_t>(touched);
@@ -296,7 +297,7 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
     pack_splat(r, center, space.packed[at]);
     chunk.near_cap |= r.log2_opacity > cap;
-    const float* const feature = scene.feature(index);
+    const float* const feature = kInRecords ? r.features.numbers : scene.feature(index);
     float* const to = space.features + static_cast<Index>(at) * channels;
     for (Index k = 0; k < channels; ++k) to[k] = feature[k];
   }
