@@ -82,6 +82,16 @@ double valid_radius_squared(const Lens& lens) {
   return std::numeric_limits<double>::infinity();
 }
 
+bool covers_picture(const Lens& lens, const Camera& camera) {
+  const double valid = std::sqrt(valid_radius_squared(lens));
+  if (!std::isfinite(valid)) return true;
+  const Lens radial{.k1 = lens.k1, .k2 = lens.k2, .k3 = lens.k3};
+  const double widest = bent_by(radial, {valid, 0})[0];
+  const auto is_shown = [&](double from_center, double focal) { return std::abs(from_center) / focal <= widest; };
+  return is_shown(camera.cx, camera.fx) && is_shown(camera.width - camera.cx, camera.fx) &&
+         is_shown(camera.cy, camera.fy) && is_shown(camera.height - camera.cy, camera.fy);
+}
+
 StraightImage straightened(const Image& image, const Camera& camera, const Lens& lens, Sampling sampling) {
   HSI4D_CHECK_EQ(image.width(), camera.width);
   HSI4D_CHECK_EQ(image.height(), camera.height);

@@ -33,6 +33,10 @@ Vector2<double> straight_of(const Lens& lens, const Vector2<double>& bent);
 /// lenses that never turn back.
 double valid_radius_squared(const Lens& lens);
 
+/// Whether the lens shows the middles of the picture's edges: one that turns back before them took no such picture.
+/// @param camera  whose intrinsics the lens goes with
+bool covers_picture(const Lens& lens, const Camera& camera);
+
 /// A picture as a pinhole would have taken it.
 struct StraightImage {
   Image image;  ///< [C,H,W], 0 where `seen` is

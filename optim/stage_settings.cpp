@@ -123,7 +123,9 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
 void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
   f.choice("over", s.over, kStageScopes,
-           "What is optimised at once: frame 0 before the others, each frame in turn, or the sequence after them");
+           "What is optimised at once: frame 0 before the others, each frame in turn, or the sequence after them; "
+           "frames after "
+           "the sequence: a further pass, each frame from where the stages before left it");
   f.choice("draw", s.draw, kDraws, "What is rendered: everything, or the static scene alone");
   f.choice("weight", s.weight, kPixelWeights,
            "Pixels that count in weighted losses: all, those never masked so far, those outside this frame's masks, "

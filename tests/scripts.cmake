@@ -63,6 +63,9 @@ if(HSI4D_PYTHON3)
   set_tests_properties("what the front end says of wrong input" PROPERTIES LABELS quick)
   set_tests_properties("exporters of VPoser, WHAM, GVHMR, TRAM and WHAC" "services for video, masks and poses" "embeddings by CLIP"
                        "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+  add_test(NAME "links between pages"
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/links_test.py ${PROJECT_SOURCE_DIR})
+  set_tests_properties("links between pages" PROPERTIES LABELS quick)
   add_test(NAME "events for TensorBoard"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/tensorboard_test.py $<TARGET_FILE:hsi4d>)
   set_tests_properties("events for TensorBoard" PROPERTIES LABELS quick TIMEOUT 300)

@@ -183,7 +183,7 @@ std::string json_info(const std::string& path) {
   return text + "\n";
 }
 
-std::string size_text(const Image& image) {
+std::string pixels_text(const Image& image) {
   return std::to_string(image.width()) + " x " + std::to_string(image.height()) + " pixels";
 }
 
@@ -191,13 +191,13 @@ std::string image_info(const std::string& path) {
   static const std::vector<std::string> kinds = {"grey", "grey and alpha", "RGB", "RGB and alpha"};
   const Image image = read_image(path);
   const auto channels = static_cast<std::size_t>(image.channels());
-  return path + ": " + size_text(image) + ", " + std::to_string(channels) + " channel" + (channels == 1 ? "" : "s") +
+  return path + ": " + pixels_text(image) + ", " + std::to_string(channels) + " channel" + (channels == 1 ? "" : "s") +
          (channels <= kinds.size() ? " (" + kinds[channels - 1] + ")" : "") + "\n";
 }
 
 std::string exr_info(const std::string& path) {
   const Layers layers = read_layers(path);
-  std::string text = path + ": " + size_text(layers.planes) + ", layers";
+  std::string text = path + ": " + pixels_text(layers.planes) + ", layers";
   for (const std::string& name : layers.names) text += " " + name;
   return text + "\n";
 }
@@ -261,7 +261,7 @@ std::string video_info(const std::string& path, std::optional<double> video_rate
   const FrameSource frames(path, {video_rate.value_or(0), frame_rate.value_or(0), "--video-rate", "--frame-rate"});
   const Image first = frames.read(0);
   const std::string rate = frames.video_rate() > 0 ? rounded(frames.video_rate(), 6) + " a second" : "no rate is known";
-  return path + ": " + count_text(frames.video_count(), "frame") + " of " + size_text(first) + ", " + rate +
+  return path + ": " + count_text(frames.video_count(), "frame") + " of " + pixels_text(first) + ", " + rate +
          (frames.count() == frames.video_count() && !frame_rate
               ? ""
               : "; a clip of " + rounded(frames.frame_rate(), 6) + " a second has " +
@@ -286,7 +286,7 @@ std::string info_command(const std::string& path, bool json) {
   }
   const std::vector<std::string> known = info_endings();
   throw UserError("hsi4d info: " + path + ": nothing is known of files that end in \"" + ending +
-                  "\"; allowed: " + joined(known) + did_you_mean(ending, known));
+                  "\"; allowed: " + joined(known) + " and videos: " + video_endings() + did_you_mean(ending, known));
 }
 
 void add_info(CLI::App& app, Program& program) {

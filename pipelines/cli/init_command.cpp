@@ -16,11 +16,14 @@
 #include "core/file.h"
 #include "core/folder_in_making.h"
 #include "core/image_io.h"
+#include "core/lens.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/size_text.h"
 #include "core/text.h"
 #include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/first_state.h"
+#include "pipelines/cli/info_command.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
 #include "pipelines/cli/scene_options.h"
@@ -48,6 +51,7 @@ struct InitArguments {
   std::string camera;  ///< empty: from the keypoints
   std::optional<double> focal_px, camera_height, lens_k1, video_rate, frame_rate;
   std::optional<int> longest_side_px, threads;
+  bool check = false;  ///< look at what is there, and write nothing
 };
 
 const std::string kInitCommand = "hsi4d init: ";
@@ -81,6 +85,20 @@ Camera camera_of_images(const InitArguments& a, const FrameSource& frames) {
   const double focal = a.focal_px.value_or(usual_focal_length(frame.width(), frame.height()));
   return reduced_camera({frame.width(), frame.height(), focal, focal, frame.width() / 2.0, frame.height() / 2.0, {}},
                         a.longest_side_px.value_or(kLongestSide));
+}
+
+/// Throws UserError for one that turns back within the picture.
+Lens lens_of(const InitArguments& a, const Camera& images) {
+  const Lens lens{.k1 = a.lens_k1.value_or(0)};
+  if (!covers_picture(lens, images))
+    throw UserError(kInitCommand + "--lens-k1 is " + number_text(lens.k1) +
+                    ": such a lens turns back before an edge of the picture (" + size_text(images) + ", focal length " +
+                    number_text(images.fx) + " px); allowed: numbers nearer to 0");
+  return lens;
+}
+
+Avatar avatar_of(const InitArguments& a) {
+  return a.avatar.empty() ? surface_avatar(procedural_body(), AvatarOptions().settings) : read_person(a.avatar);
 }
 
 /// What the keypoints say of camera and person. Of a camera that moves, those of frame 0 alone count.
@@ -180,10 +198,11 @@ void check_options(const InitArguments& a) {
   check_range(a.camera_height, kInitCommand + "--camera-height", 0.1, 100);
   check_range(a.lens_k1, kInitCommand + "--lens-k1", -10, 10);
   check_range(a.longest_side_px, kInitCommand + "--longest-side-px", 64, 4096);
-  if (!a.camera.empty() && (a.focal_px || a.camera_height))
+  if (!(a.camera.empty() && a.scene.empty()) && (a.focal_px || a.camera_height))
     throw UserError(kInitCommand +
-                    "--camera says the focal length and the height; leave out --focal-px and --camera-height");
-  if (!a.scene.empty() && a.camera.empty())
+                    "the camera in a scene, or of --camera, has a focal length and a height; leave out --focal-px and "
+                    "--camera-height");
+  if (!a.scene.empty() && a.camera.empty() && !a.check)
     throw UserError(kInitCommand +
                     "--scene needs --camera: where the camera of frame 0 is in it, as hsi4d locate says");
 }
@@ -205,11 +224,10 @@ std::string write_footage(const InitArguments& a, const std::vector<LossDescript
   const DataSettings data = data_of(a);
   ClipVideo video = open_video(data, {});
   Keypoints keypoints = read_keypoints(data, video.frames);
-  const Avatar avatar =
-      a.avatar.empty() ? surface_avatar(procedural_body(), AvatarOptions().settings) : read_person(a.avatar);
+  const Avatar avatar = avatar_of(a);
   const RunConfig shipped = shipped_config(losses);
   const Camera images = camera_of_images(a, video.frames);
-  video.lens = {.k1 = a.lens_k1.value_or(0)};
+  video.lens = lens_of(a, images);
   video.camera = images;
   straighten(video.lens, images, keypoints);
   if (!a.scene.empty()) read_drawn(a.scene, shipped.render);  // a wrong file is refused before the work
@@ -227,8 +245,20 @@ std::string write_footage(const InitArguments& a, const std::vector<LossDescript
   return told(a, found, plate);
 }
 
+/// Options, the video and the files that are there, before keypoints and masks are. Returns what the command prints.
+std::string check_footage(const InitArguments& a, const std::vector<LossDescription>& losses) {
+  const FrameSource frames(a.video,
+                           {a.video_rate.value_or(0), a.frame_rate.value_or(0), "--video-rate", "--frame-rate"});
+  const bool is_to_be_located = !a.scene.empty() && a.camera.empty();
+  if (!is_to_be_located) lens_of(a, camera_of_images(a, frames));
+  if (!a.avatar.empty()) read_person(a.avatar);
+  if (!a.scene.empty()) read_drawn(a.scene, shipped_config(losses).render);
+  return video_info(a.video, a.video_rate, a.frame_rate);
+}
+
 std::string init_command(const InitArguments& a, const std::vector<LossDescription>& losses) {
   check_options(a);
+  if (a.check) return check_footage(a, losses);
   const int threads = a.threads.value_or(0);
   std::string text;
   with_threads(threads > 0 ? threads : thread_count(), [&] { text = write_footage(a, losses); });
@@ -265,6 +295,8 @@ void add_init(CLI::App& app, Program& program) {
                   "Of the images that are compared; default: 512, or the camera's")
       ->type_name("N");
   add_threads(command, a.threads);
+  command.add_flag("--check", a.check,
+                   "Look at options, video and files before keypoints and masks, and the camera in a scene, are there");
   command.add_option("--out", a.out, "Where to: a new or empty folder")->type_name("DIR")->required();
   run_when_chosen(command, program, [&] { return init_command(a, descriptions_of(program.terms)); });
 }

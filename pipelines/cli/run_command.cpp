@@ -59,11 +59,13 @@ std::string folder_plan(const RunConfig& config, const std::string& identity, co
 
 std::string stages_text(const RunConfig& config) {
   std::string text;
+  bool is_again = false;
   for (const auto& [name, stage] : config.stages) {
     text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") +
             (stage.over == StageScope::kFirst   ? " over the first frame\n"
-             : stage.over == StageScope::kFrame ? " a frame\n"
+             : stage.over == StageScope::kFrame ? (is_again ? " a frame, again\n" : " a frame\n")
                                                 : " over the sequence\n");
+    is_again = is_again || stage.over == StageScope::kSequence;
   }
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;

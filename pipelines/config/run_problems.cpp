@@ -72,8 +72,8 @@ std::string scope_in_words(StageScope scope) {
   return scope == StageScope::kFrame ? "over frames" : "over the sequence";
 }
 
-/// Stages over the first frame, then those over each of the others, then those over the sequence: each begins where
-/// those before ended.
+/// Stages over the first frame, then those over each of the others, then those over the sequence, which others over
+/// frames may follow: each begins where those before ended.
 void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunProblem>& found) {
   const auto place = [](const std::string& name) { return child_pointer(child_pointer("/stages", name), "over"); };
   const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
@@ -81,14 +81,17 @@ void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunP
   const std::pair<std::string, StageSettings>* latest = nullptr;  // of those so far
   for (const auto& entry : stages) {
     const auto& [name, stage] = entry;
-    if (latest != nullptr && stage.over < latest->second.over) {
+    const bool goes_again =
+        latest != nullptr && stage.over == StageScope::kFrame && latest->second.over == StageScope::kSequence;
+    if (latest != nullptr && stage.over < latest->second.over && !goes_again) {
       found.push_back({place(name),
                        "a stage " + scope_in_words(stage.over) + " cannot come after " + json_string(latest->first) +
                            ", which is " + scope_in_words(latest->second.over),
                        {place(name), place(latest->first)}});
       continue;
     }
-    if (latest == nullptr && stage.over == StageScope::kSequence)
+    const bool is_first = latest == nullptr || (has_frames && latest->second.over == StageScope::kFirst);
+    if (is_first && stage.over == StageScope::kSequence)
       found.push_back({place(name), "a stage over the sequence needs one over frames before it", {place(name)}});
     latest = &entry;
   }
@@ -98,14 +101,16 @@ void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunP
                      {place(stages.front().first)}});
 }
 
-/// The best start is chosen by images of everything, before the first stage that draws it.
+/// The best start is chosen by images of everything, before the first stage that draws it, in the first pass.
 void add_start_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
   const auto chooses = [](const auto& entry) {
     return entry.second.over == StageScope::kFrame && entry.second.draw == Draw::kAll;
   };
-  if (std::none_of(config.stages.begin(), config.stages.end(), is_of_frames)) return;
-  if (std::any_of(config.stages.begin(), config.stages.end(), chooses)) return;
+  const auto end = std::find_if(config.stages.begin(), config.stages.end(),
+                                [](const auto& entry) { return entry.second.over == StageScope::kSequence; });
+  if (std::none_of(config.stages.begin(), end, is_of_frames)) return;
+  if (std::any_of(config.stages.begin(), end, chooses)) return;
   for (const auto& [key, from] :
        {std::pair{"pose", config.start.pose}, {"root", config.start.root}, {"objects", config.start.objects}}) {
     if (from == StartFrom::kBest)

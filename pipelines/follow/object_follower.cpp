@@ -12,7 +12,7 @@ namespace hsi4d {
 
 namespace {
 
-// What is added up: log odds. All were chosen on three generated clips (docs/numerics/accuracy.md).
+// What is added up: log odds. All were chosen on three generated clips (docs/numerics/footage.md).
 constexpr double kPersonOdds = 2;      // against a pixel that the human's mask covers
 constexpr double kBackgroundOdds = 3;  // against one that looks as the background did there
 constexpr double kMostInside = 2;      // for one in what is expected

@@ -228,6 +228,13 @@ std::string off_text(const std::vector<std::string>& losses) {
          (quoted.size() == 1 ? " is" : " are") + " off for it there";
 }
 
+void check_lens(const Lens& lens, const Camera& camera) {
+  if (!covers_picture(lens, camera))
+    throw UserError("/data/lens: such a lens turns back before an edge of the picture (" + size_text(camera) +
+                    ", focal length " + number_text(camera.fx) +
+                    " px); allowed: those that show the middles of all edges");
+}
+
 }  // namespace
 
 ClipVideo open_video(const DataSettings& data, const std::vector<std::string>& objects) {
@@ -262,6 +269,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   if (!data.tracks.empty()) clip.tracks = read_point_tracks(data, video->frames);
   if (!data.depth_maps.empty()) clip.depth_maps = find_depth_maps(data, video->frames);
   if (!data.contacts.empty()) clip.contacts = read_contacts(data.contacts.string(), {names, clip.frames()});
+  check_lens(data.lens.lens, clip.camera);
   if (!data.lens.estimate_k1) set_lens(data.lens.lens, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);

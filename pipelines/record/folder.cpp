@@ -169,15 +169,22 @@ std::string metrics_line(const IterationRecord& record) {
   return to_json_line(line) + "\n";
 }
 
-/// None: the line is of all frames at once.
-std::optional<int> frame_of_line(const std::string& text, const std::string& file, int line) {
-  const auto read = [&](int at) -> std::optional<int> {
+/// What a line of metrics.jsonl is of; no frame: of all at once.
+struct LineOrigin {
+  std::string stage;
+  std::optional<int> frame;
+};
+
+LineOrigin origin_of_line(const std::string& text, const std::string& file, int line) {
+  const auto read = [&](int at) -> LineOrigin {
     const ConfigValue record = parse_json_text(text, file, at);
     check_kind(record, Kind::kObject, "");
-    if (find_member(record, "stage") == nullptr) fail_at(record, "", "there is no \"stage\"");
+    const ConfigValue* const stage = find_member(record, "stage");
+    if (stage == nullptr) fail_at(record, "", "there is no \"stage\"");
+    check_kind(*stage, Kind::kString, "/stage");
     const ConfigValue* const frame = find_member(record, "frame");
-    if (frame == nullptr) return std::nullopt;
-    return static_cast<int>(whole_number_of(*frame, "/frame"));
+    if (frame == nullptr) return {stage->text, std::nullopt};
+    return {stage->text, static_cast<int>(whole_number_of(*frame, "/frame"))};
   };
   try {
     return read(1);
@@ -186,15 +193,16 @@ std::optional<int> frame_of_line(const std::string& text, const std::string& fil
   }
 }
 
-/// The complete lines of frames up to `last`.
-std::string lines_up_to(const std::string& text, int last, const std::string& file) {
+/// The complete lines that are kept.
+template <class F>
+std::string kept_lines(const std::string& text, const F& is_kept, const std::string& file) {
   std::string kept;
   size_t begin = 0;
   for (int line = 1; begin < text.size(); ++line) {
     const size_t end = text.find('\n', begin);
     if (end == std::string::npos) break;  // cut short by a kill
-    const std::optional<int> frame = frame_of_line(text.substr(begin, end - begin), file, line);
-    if (frame && *frame <= last) kept.append(text, begin, end + 1 - begin);
+    const LineOrigin origin = origin_of_line(text.substr(begin, end - begin), file, line);
+    if (is_kept(origin.stage, origin.frame)) kept.append(text, begin, end + 1 - begin);
     begin = end + 1;
   }
   return kept;
@@ -371,9 +379,9 @@ void RunFolder::append_metrics(const IterationRecord& record) {
   metrics_->append(metrics_line(record));
 }
 
-void RunFolder::truncate_metrics_after(int frame) {
+void RunFolder::keep_metrics(const std::function<bool(const std::string&, std::optional<int>)>& is_kept) {
   const std::string text = read_text_file(paths_.metrics());
-  const std::string kept = lines_up_to(text, frame, paths_.metrics());
+  const std::string kept = kept_lines(text, is_kept, paths_.metrics());
   if (kept.size() == text.size()) return;
   metrics_.reset();
   write_text_file(paths_.metrics(), kept);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -127,10 +128,10 @@ class RunFolder {
   /// Throws InternalError naming the member for a number that is not finite, unless the step was rolled back.
   void append_metrics(const IterationRecord& record);
 
-  /// Drops the lines of later frames and of all frames at once, and a last line that was cut short: with `frame` that
-  /// of the checkpoint, the file is as if the run had never gone further. Throws DataError naming the line that is none
-  /// of ours.
-  void truncate_metrics_after(int frame);
+  /// Keeps the lines of metrics.jsonl that `is_kept` says, of those that are whole: asked for what the checkpoint has,
+  /// the file is as if the run had never gone further. Throws DataError naming the line that is none of ours.
+  /// @param is_kept  called with the stage and the frame of a line; none: it is of all frames at once
+  void keep_metrics(const std::function<bool(const std::string& stage, std::optional<int> frame)>& is_kept);
 
   /// Writes summary.json. Errors as summary_json.
   void write_summary(const RunSummary& summary);

@@ -72,7 +72,8 @@ const ConfigValue& member_of(const ConfigValue& line, std::string_view key) {
 IterationRecord record_of_line(const ConfigValue& line) {
   check_kind(line, Kind::kObject, "");
   IterationRecord record;
-  record.frame = static_cast<int>(whole_number_of(member_of(line, "frame"), "/frame"));
+  if (const ConfigValue* const frame = find_member(line, "frame"))
+    record.frame = static_cast<int>(whole_number_of(*frame, "/frame"));
   const ConfigValue& stage = member_of(line, "stage");
   check_kind(stage, Kind::kString, "/stage");
   record.stage = stage.text;
@@ -135,16 +136,22 @@ RunEvents::~RunEvents() = default;
 void RunEvents::add_kept_lines(Index first, Index end) {
   const std::string text = read_text_file(paths_.metrics());
   Index frame = first;
+  std::optional<int> again;  // the frame at hand of a later pass
+  bool is_later = false;     // than the first pass, after which there is a stage over the sequence
   std::size_t begin = 0;
   for (int number = 1; begin < text.size(); ++number) {
     const std::size_t line_end = std::min(text.find('\n', begin), text.size());
     const ConfigValue line = checked_line(text.substr(begin, line_end - begin), paths_.metrics(), number);
     const IterationRecord record = record_of_line(line);
-    while (frame < *record.frame) end_frame(frame++);
+    is_later = is_later || !record.frame;
+    while (frame < (is_later ? end : Index{*record.frame})) end_frame(frame++);
+    if (again && record.frame != again) end_frame(*again);
+    again = is_later ? record.frame : std::nullopt;
     add(record);
     begin = line_end + 1;
   }
   while (frame < end) end_frame(frame++);
+  if (again) end_frame(*again);
 }
 
 EventTime RunEvents::at(std::int64_t step) const { return {started_ + seconds_, step}; }

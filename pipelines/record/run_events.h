@@ -34,8 +34,9 @@ struct ShownImages {
 class RunEvents {
  public:
   /// Begins a file anew with what metrics.jsonl and frames/ hold of the frames from `first` up to `end`, which are
-  /// done, and removes the file of before: a run that is resumed has the events of one that never was stopped.
-  /// Throws UserError where it cannot be written, DataError for a line or a time that is none of ours.
+  /// done, and of all that came after the first pass through the frames, and removes the file of before: a run that is
+  /// resumed has the events of one that never was stopped. Throws UserError where it cannot be written, DataError for a
+  /// line or a time that is none of ours.
   RunEvents(const RunFolder& folder, ShownImages images, Index first, Index end);
   ~RunEvents();
   RunEvents(const RunEvents&) = delete;
@@ -44,7 +45,7 @@ class RunEvents {
   /// A line of metrics.jsonl.
   void add(const IterationRecord& record);
 
-  /// A frame is done, and its images are in frames/.
+  /// A frame is done, or done again in a later pass, and its images are in frames/.
   void end_frame(Index frame);
 
   /// The images of a frame are in frames/, as they stay: at the end of a run that draws them again.

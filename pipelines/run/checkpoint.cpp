@@ -59,7 +59,7 @@ std::string left_out_text(const std::vector<LeftOutInFrame>& left_out) {
   return text;
 }
 
-/// @param stages       over the first frame and over frames
+/// @param stages       of the config
 /// @param first_frame  1, or 0 where there are stages over frame 0
 std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages,
                                         Index first_frame) {
@@ -227,6 +227,84 @@ std::vector<FirstFrameState> stored_first_frame(const Checkpoint& checkpoint, co
   return found;
 }
 
+// ---- After the first pass ----
+
+constexpr const char* kLaterFrames = "later/frames";
+
+void store_later(const std::vector<LaterStage>& stages, Checkpoint& checkpoint) {
+  if (stages.empty()) return;
+  std::vector<std::int64_t> frames;
+  std::vector<double> states;
+  StoredTotals totals;
+  for (const LaterStage& stage : stages) {
+    frames.push_back(std::ssize(stage.states));
+    for (const SceneState& state : stage.states) append(state, states);
+    totals.add(stage.totals);
+  }
+  checkpoint.set(kLaterFrames, std::move(frames));
+  checkpoint.set("later/states", std::move(states));
+  checkpoint.set("later/counts", std::move(totals.counts));
+  checkpoint.set("later/seconds", std::move(totals.seconds));
+}
+
+/// Whether as many frames of each stage can be done: all, but for the stages of a last pass, which go through the
+/// frames together.
+bool are_frames_of_later(const std::vector<std::int64_t>& frames, std::int64_t all, std::span<const StageScope> over) {
+  const auto is_within_pass = [over](std::size_t s) {
+    return s > 0 && s < over.size() && over[s - 1] == StageScope::kFrame && over[s] == StageScope::kFrame;
+  };
+  const std::size_t count = frames.size();
+  if (count > over.size() || is_within_pass(count)) return false;
+  std::size_t first = 0;  // that has not done all
+  while (first < count && frames[first] == all) ++first;
+  if (first == count) return true;
+  if (is_within_pass(first) || frames[first] < 1 || frames[first] > all) return false;
+  for (std::size_t s = first; s < count; ++s) {
+    if (over[s] != StageScope::kFrame || frames[s] != frames[first]) return false;
+  }
+  return true;
+}
+
+std::vector<LaterStage> stored_later(const Checkpoint& checkpoint, const Clip& clip, std::span<const StageScope> over) {
+  std::vector<LaterStage> found;
+  if (!checkpoint.has(kLaterFrames)) return found;
+  const std::vector<std::int64_t>& frames = checkpoint.integers(kLaterFrames);
+  if (!are_frames_of_later(frames, clip.frames(), over))
+    throw DataError(checkpoint.source() + ": \"" + kLaterFrames + "\" holds numbers of frames that the " +
+                    std::to_string(over.size()) + " stages after the first pass cannot have done in a clip of " +
+                    std::to_string(clip.frames()));
+  std::size_t all = 0;
+  for (const std::int64_t done : frames) all += static_cast<std::size_t>(done);
+  const auto per_state = static_cast<std::size_t>(numbers_per_state(clip));
+  const double* next = stored_states(checkpoint, "later/states", all * per_state).data();
+  const std::vector<std::int64_t>& counts = checkpoint.integers("later/counts");
+  expect_size(checkpoint, "later/counts", counts.size(), kCounts * frames.size());
+  const std::vector<double>& seconds = checkpoint.doubles("later/seconds");
+  expect_size(checkpoint, "later/seconds", seconds.size(), frames.size());
+  for (std::size_t s = 0; s < frames.size(); ++s) {
+    found.push_back({{}, totals_at(counts, seconds, s)});
+    for (std::int64_t t = 0; t < frames[s]; ++t, next += per_state)
+      found.back().states.push_back(state_from(next, clip));
+  }
+  return found;
+}
+
+constexpr const char* kBias = "depth_bias";  // the human's factor, then the objects'
+
+void store_bias(const DepthBias& bias, Checkpoint& checkpoint) {
+  std::vector<double> factors = {bias.human};
+  factors.insert(factors.end(), bias.objects.begin(), bias.objects.end());
+  checkpoint.set(kBias, std::move(factors));
+}
+
+std::optional<DepthBias> stored_bias(const Checkpoint& checkpoint, const Clip& clip) {
+  if (!checkpoint.has(kBias)) return {};
+  const std::vector<double>& factors = stored_states(checkpoint, kBias, 1 + clip.objects.size());
+  return DepthBias{factors[0], {factors.begin() + 1, factors.end()}};
+}
+
+// ---- Other entries ----
+
 void store_start(const StartTotals& start, Checkpoint& checkpoint) {
   std::vector<std::int64_t> frames;
   for (const auto& part : start.frames) frames.insert(frames.end(), part.begin(), part.end());
@@ -295,8 +373,8 @@ std::vector<PlaceSigmas> stored_sigmas(const Checkpoint& checkpoint, const Clip&
 
 }  // namespace
 
-const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
-  return refinement.stages.empty() ? progress.after_stage.back() : refinement.stages.back().states;
+const std::vector<SceneState>& result_of(const RunProgress& progress) {
+  return progress.later.empty() ? progress.after_stage.back() : progress.later.back().states;
 }
 
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net) {
@@ -325,6 +403,8 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("seconds", std::move(totals.seconds));
   store_first_frame(progress.first_frame, checkpoint);
   store_unknowns(progress.unknowns, checkpoint);
+  store_later(progress.later, checkpoint);
+  if (progress.bias) store_bias(*progress.bias, checkpoint);
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
@@ -341,7 +421,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
 }
 
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
-                          std::optional<ColorNet> net, std::size_t first_stages) {
+                          std::optional<ColorNet> net, std::size_t first_stages, std::span<const StageScope> later) {
   const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
   const auto expect = [&checkpoint](const char* name, std::size_t found, std::size_t wanted) {
     expect_size(checkpoint, name, found, wanted);
@@ -376,6 +456,8 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   progress.seconds = seconds.back();
   progress.first_frame = stored_first_frame(checkpoint, clip, first_stages);
   progress.unknowns = stored_unknowns(checkpoint, clip);
+  progress.later = stored_later(checkpoint, clip, later);
+  progress.bias = stored_bias(checkpoint, clip);
   const std::vector<float>& covered = checkpoint.floats("covered");
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
@@ -385,10 +467,10 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   progress.sigmas = stored_sigmas(checkpoint, clip, static_cast<std::size_t>(frames[0]));
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   const Index first_frame = first_stages > 0 ? 0 : 1;
-  progress.left_out = left_out_of(checkpoint, clip, first_stages + stages, first_frame);
-  progress.still = names_of<StillGroup>(checkpoint, kStill, "group", clip, first_stages + stages, first_frame);
-  progress.left_ranges =
-      names_of<LeftRange>(checkpoint, kLeftRanges, "setting", clip, first_stages + stages, first_frame);
+  const std::size_t all_stages = first_stages + stages + later.size();
+  progress.left_out = left_out_of(checkpoint, clip, all_stages, first_frame);
+  progress.still = names_of<StillGroup>(checkpoint, kStill, "group", clip, all_stages, first_frame);
+  progress.left_ranges = names_of<LeftRange>(checkpoint, kLeftRanges, "setting", clip, all_stages, first_frame);
   progress.image_errors = stored_errors("image_errors", done, checkpoint);
   progress.start_errors = stored_errors("start_errors", done, checkpoint);
   return progress;

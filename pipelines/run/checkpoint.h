@@ -1,6 +1,8 @@
 // What a run has found so far, and its checkpoint.
 #pragma once
 
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,7 @@
 #include "pipelines/input/color_state.h"
 #include "pipelines/input/state.h"
 #include "pipelines/record/summary.h"
+#include "pipelines/run/depth_bias.h"
 #include "pipelines/run/start_choice.h"
 
 namespace hsi4d {
@@ -50,11 +53,17 @@ struct FirstFrameState {
   StageTotals totals;
 };
 
+/// What a stage that comes after the first pass through the frames has found.
+struct LaterStage {
+  std::vector<SceneState> states;  ///< by frame, frame 0 included; over frames: of those that are done
+  StageTotals totals;
+};
+
 /// Everything that the next frame depends on, or that the end of the run tells.
 struct RunProgress {
   std::vector<FirstFrameState> first_frame;          ///< by stage over the first frame; none: frame 0 is as given
-  std::vector<std::vector<SceneState>> after_stage;  ///< [stage over frames][frame]; frame 0 is the given or found one
-  std::vector<StageTotals> totals;                   ///< by stage over frames
+  std::vector<std::vector<SceneState>> after_stage;  ///< [stage of the first pass][frame]; frame 0 is given or found
+  std::vector<StageTotals> totals;                   ///< by stage of the first pass
   std::vector<MetricValues> image_errors;            ///< [frame]; none of a frame 0 that is as given
   std::vector<MetricValues> start_errors;            ///< the same of what each frame's image was given
   std::string inputs;                                ///< what was read so far, in the form of input_hashes
@@ -66,31 +75,21 @@ struct RunProgress {
   std::vector<PlaceSigmas> sigmas;                   ///< [frame]; none unless the config asks for it
   ColorState colors;                                 ///< after the last frame done
   ClipUnknowns unknowns;                             ///< what stages over the first frame found of the clip
-  double seconds = 0;                                ///< of the frames done
+  std::optional<DepthBias> bias;                     ///< taken from all that stages over frames found; none: not yet
+  std::vector<LaterStage> later;                     ///< those that have begun, in the order in which they run
+  std::vector<MetricValues> result_errors;           ///< [frame] of images after the last of them; in no checkpoint
+  double seconds = 0;                                ///< of what is done
   std::string isa;  ///< isa_name of who wrote the checkpoint; empty: not read from one, or from an older one
 
-  /// Frames done, frame 0 included.
+  /// Frames done, frame 0 included, in the first pass.
   Index frames_done() const { return after_stage.empty() ? 0 : static_cast<Index>(after_stage.front().size()); }
 };
 
-/// All frames after a stage over the sequence.
-struct RefinedStates {
-  std::vector<SceneState> states;  ///< by frame, frame 0 included
-  StageTotals totals;
-};
-
-/// What the stages over the sequence have found, which come after all frames. It is in no checkpoint.
-struct RefinementProgress {
-  std::vector<RefinedStates> stages;
-  std::vector<MetricValues> image_errors;  ///< of the last of them, by frame, as those of RunProgress
-  double seconds = 0;
-};
-
 /// The states by frame after the last stage so far.
-const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement);
+const std::vector<SceneState>& result_of(const RunProgress& progress);
 
 /// Nothing done but the given frame 0.
-/// @param stages  how many there are over frames
+/// @param stages  how many there are over frames, in the first pass
 /// @param net  with which the run begins, if it has one
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
 
@@ -102,7 +101,9 @@ void save_progress(const std::string& file, const std::string& config, const Run
 /// clip.
 /// @param stages, net   as of first_progress
 /// @param first_stages  how many there are over the first frame
+/// @param later         what those are over that come after the first pass through the frames
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
-                          std::optional<ColorNet> net = {}, std::size_t first_stages = 0);
+                          std::optional<ColorNet> net = {}, std::size_t first_stages = 0,
+                          std::span<const StageScope> later = {});
 
 }  // namespace hsi4d

@@ -46,18 +46,30 @@ std::string checkpoint_identity(const RunConfig& config, const std::vector<LossT
   return to_json(sections_beside_data(config, descriptions_of(losses)));
 }
 
-std::size_t count_stages(const RunConfig& config, StageScope over) {
-  const auto is_over = [over](const auto& entry) { return entry.second.over == over; };
-  return static_cast<std::size_t>(std::count_if(config.stages.begin(), config.stages.end(), is_over));
+/// What the stages are over, in the order in which they run.
+struct StageOrder {
+  std::size_t first = 0, frames = 0;  ///< how many there are over the first frame, and of the first pass
+  std::vector<StageScope> later;      ///< of those after them
+};
+
+StageOrder order_of_stages(const RunConfig& config) {
+  StageOrder order;
+  for (const auto& [name, stage] : config.stages) {
+    if (stage.over == StageScope::kFirst) ++order.first;
+    const bool is_later = stage.over == StageScope::kSequence || !order.later.empty();
+    if (is_later) order.later.push_back(stage.over);
+    if (!is_later && stage.over == StageScope::kFrame) ++order.frames;
+  }
+  return order;
 }
 
 /// What is in a checkpoint, if its inputs are still the same.
 RunProgress read_checkpoint(const std::string& file, const std::string& identity, const RunConfig& config,
                             const Clip& clip) {
   RunProgress progress;
+  const StageOrder order = order_of_stages(config);
   try {
-    progress = load_progress(file, identity, clip, count_stages(config, StageScope::kFrame), first_net(config, clip),
-                             count_stages(config, StageScope::kFirst));
+    progress = load_progress(file, identity, clip, order.frames, first_net(config, clip), order.first, order.later);
   } catch (const DataError& damage) {
     throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
   }
@@ -102,8 +114,9 @@ class Reconstruction {
         observer_(observer),
         identity_(checkpoint_identity(config, losses)),
         clip_(clip),
-        first_stages_(count_stages(config, StageScope::kFirst)),
-        frame_stages_(count_stages(config, StageScope::kFrame)),
+        order_(order_of_stages(config)),
+        first_stages_(order_.first),
+        frame_stages_(order_.frames),
         progress_(first_progress(clip_, frame_stages_, first_net(config, clip))),
         sigmas_(no_sigmas(clip.objects.size())),
         surest_stage_(config.uncertainty ? stage_of_sigmas(config) : std::nullopt),
@@ -114,8 +127,8 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
-    if (config_.remove_depth_bias) remove_bias();
-    if (sequence_stage() < config_.stages.size()) refine();
+    if (config_.remove_depth_bias && !progress_.bias) remove_bias();
+    run_later_stages();
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
     warn_of_still_groups(progress_.still, config_);
@@ -123,7 +136,7 @@ class Reconstruction {
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors, progress_.sigmas);
     if (!progress_.unknowns.betas.empty()) write_found_avatar();
-    RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
+    RunSummary summary = summarize_run(config_, clip_, progress_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
     if (events_) events_->add_result(summary);
@@ -141,26 +154,37 @@ class Reconstruction {
   }
 
  private:
-  /// Stages over the first frame come first, then those over frames, and last those over the sequence.
-  std::size_t sequence_stage() const { return first_stages_ + frame_stages_; }
+  /// Stages over the first frame come first, then those over frames; from the first one over the sequence on, those
+  /// over frames go through them again.
+  std::size_t later_stage() const { return first_stages_ + frame_stages_; }
+  bool has_later() const { return !order_.later.empty(); }
 
-  std::int64_t steps_of(StageScope over) const {
+  /// Steps of the stages [begin, end), each once.
+  std::int64_t steps_of(std::size_t begin, std::size_t end) const {
     std::int64_t steps = 0;
-    for (const auto& [name, stage] : config_.stages) steps += stage.over == over ? stage.iterations : 0;
+    for (std::size_t s = begin; s < end; ++s) steps += config_.stages[s].second.iterations;
     return steps;
   }
-  /// Steps of the frames before `frame`.
+  /// Steps of the first pass in the frames before `frame`.
   std::int64_t steps_before(Index frame) const {
     if (frame == 0) return 0;
-    return steps_of(StageScope::kFirst) + steps_of(StageScope::kFrame) * (frame - 1);
+    return steps_of(0, first_stages_) + steps_of(first_stages_, later_stage()) * (frame - 1);
   }
-  std::int64_t total_steps() const {
-    return steps_before(clip_.frames()) + steps_of_bias() + steps_of(StageScope::kSequence);
+  /// Steps of the later stages that have begun, in the frames that are done; of all of them in all frames.
+  std::int64_t steps_of_later(bool is_done) const {
+    std::int64_t steps = 0;
+    for (std::size_t l = 0; l < (is_done ? progress_.later.size() : order_.later.size()); ++l) {
+      const Index frames = is_done ? std::ssize(progress_.later[l].states) : clip_.frames();
+      steps += steps_of(later_stage() + l, later_stage() + l + 1) *
+               (order_.later[l] == StageScope::kSequence ? 1 : frames - 1);
+    }
+    return steps;
   }
+  std::int64_t total_steps() const { return steps_before(clip_.frames()) + steps_of_bias() + steps_of_later(false); }
   /// Of a fit of frame 0.
   std::int64_t steps_of_bias() const {
     std::int64_t steps = 0;
-    for (std::size_t s = first_stages_; config_.remove_depth_bias && s < sequence_stage(); ++s)
+    for (std::size_t s = first_stages_; config_.remove_depth_bias && s < later_stage(); ++s)
       steps += fits_what_moves(s) ? config_.stages[s].second.iterations : 0;
     return steps;
   }
@@ -181,18 +205,35 @@ class Reconstruction {
       progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
     folder_.take_over_config();
-    if (folder_.resumed_from())
-      folder_.note("resumed with frame " + std::to_string(progress_.frames_done()) + " of " +
-                   std::to_string(clip_.frames() - 1));
-    folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
+    if (folder_.resumed_from()) folder_.note(resumed_text());
+    folder_.keep_metrics([this](const std::string& stage, std::optional<int> frame) { return is_done(stage, frame); });
     begin_events();
-    bar_.skip(steps_before(progress_.frames_done()));
+    bar_.skip(steps_before(progress_.frames_done()) + (progress_.bias ? steps_of_bias() : 0) + steps_of_later(true));
+  }
+
+  std::string resumed_text() const {
+    const std::string all = " of " + std::to_string(clip_.frames() - 1);
+    if (progress_.later.empty()) return "resumed with frame " + std::to_string(progress_.frames_done()) + all;
+    const std::size_t last = progress_.later.size() - 1;
+    return "resumed with frame " + std::to_string(progress_.later[last].states.size()) + all + " of stage " +
+           config_.stages[later_stage() + last].first;
+  }
+
+  /// Whether the checkpoint has what a stage found in a frame.
+  /// @param frame  none: in all at once
+  bool is_done(const std::string& stage, std::optional<int> frame) const {
+    for (std::size_t l = 0; l < order_.later.size(); ++l) {
+      if (config_.stages[later_stage() + l].first != stage) continue;
+      if (l >= progress_.later.size()) return false;
+      return !frame || *frame < std::ssize(progress_.later[l].states);
+    }
+    return frame && *frame < progress_.frames_done();
   }
 
   /// Shows the frames that are done, and from then on what comes.
   void begin_events() {
     if (!config_.log.tensorboard) return remove_run_events(folder_.paths());
-    const bool are_drawn_again = config_.remove_depth_bias || sequence_stage() < config_.stages.size();
+    const bool are_drawn_again = config_.remove_depth_bias || has_later();
     events_.emplace(folder_, ShownImages{config_.log.images_every, are_drawn_again}, first_worked_on(),
                     progress_.frames_done());
   }
@@ -303,8 +344,8 @@ class Reconstruction {
                  std::chrono::steady_clock::time_point begin) {
     write_image(folder_.paths().frame_image(static_cast<int>(index), "target"), frame.target);
     write_result(index, frame, after.back(), progress_.colors, progress_.image_errors);
-    if (progress_.colors.net && moves_colors(config_))
-      write_color_net(folder_.paths().frame_color_net(static_cast<int>(index)), *progress_.colors.net);
+    if (progress_.colors.net && hsi4d::moves_colors(config_))
+      write_color_net(net_file(index, 1), *progress_.colors.net);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     if (config_.uncertainty) progress_.sigmas.push_back(sigmas_);
     progress_.seconds += seconds_since(begin);
@@ -313,12 +354,12 @@ class Reconstruction {
   }
 
   /// Takes what a fit of frame 0 does to the given distances from all later frames. The checkpoint keeps these as they
-  /// were: a run that is resumed finds the same.
+  /// were until a later pass writes it, with the bias: a run that is resumed finds the same.
   void remove_bias() {
     const ClipFrame frame = read_frame(clip_, 0);
     SceneState fitted = clip_.first;
     ColorState colors = progress_.colors;
-    for (std::size_t s = first_stages_; s < sequence_stage(); ++s) {
+    for (std::size_t s = first_stages_; s < later_stage(); ++s) {
       if (!fits_what_moves(s)) continue;
       const StageResult found =
           run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, fitted, colors,
@@ -334,7 +375,8 @@ class Reconstruction {
     std::vector<SceneState>& states = progress_.after_stage.back();
     for (Index t = 1; t < clip_.frames(); ++t)
       hsi4d::remove_depth_bias(clip_, bias, states[static_cast<std::size_t>(t)]);
-    if (sequence_stage() < config_.stages.size()) return;  // these write the images
+    progress_.bias = bias;
+    if (has_later()) return;  // these write the images
     progress_.image_errors.resize(1);
     write_results_of_frames(progress_.image_errors);
   }
@@ -349,17 +391,90 @@ class Reconstruction {
     }
   }
 
-  /// The stages over the whole sequence, each from where the one before ended.
-  void refine() {
-    const auto begin = std::chrono::steady_clock::now();
-    for (std::size_t s = sequence_stage(); s < config_.stages.size(); ++s) {
-      std::vector<SceneState> states = result();
-      const StageTotals totals = run_over_sequence(s, states);
-      refinement_.stages.push_back({std::move(states), totals});
+  /// The stages after the first pass, each from where the one before ended, and the images of what they leave.
+  void run_later_stages() {
+    if (!has_later()) return;
+    const std::size_t count = order_.later.size();
+    for (std::size_t l = 0, end = 0; l < count; l = end) {
+      end = l + 1;
+      if (order_.later[l] == StageScope::kSequence) {
+        if (progress_.later.size() == l) refine(l);
+        continue;
+      }
+      while (end < count && order_.later[end] == StageScope::kFrame) ++end;
+      go_through_again(l, end);
     }
-    refinement_.image_errors.resize(1);
-    write_results_of_frames(refinement_.image_errors);
-    refinement_.seconds = seconds_since(begin);
+    const auto begin = std::chrono::steady_clock::now();
+    progress_.result_errors.resize(1);
+    write_results_of_frames(progress_.result_errors);
+    progress_.seconds += seconds_since(begin);
+  }
+
+  /// @param l  of the later stages, one over the sequence
+  void refine(std::size_t l) {
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<SceneState> states = result();
+    const StageTotals totals = run_over_sequence(later_stage() + l, states);
+    progress_.later.push_back({std::move(states), totals});
+    progress_.seconds += seconds_since(begin);
+  }
+
+  /// A pass through the frames after the first: each begins where the stages before left it.
+  /// @param l, end  of the later stages
+  void go_through_again(std::size_t l, std::size_t end) {
+    ++pass_;
+    tracks_ = {};
+    if (progress_.later.size() == l) progress_.later.resize(end, {{states_before(l).front()}, {}});
+    for (Index t = std::ssize(progress_.later[l].states); t < clip_.frames(); ++t) run_frame_again(t, l, end);
+    if (moves_colors(l, end)) colors_pass_ = pass_;
+  }
+
+  void run_frame_again(Index index, std::size_t l, std::size_t end) {
+    const auto begin = std::chrono::steady_clock::now();
+    const ClipFrame frame = read_frame(clip_, index);
+    std::vector<SceneState> done = progress_.later[end - 1].states;
+    for (SceneState& state : done) give_bias(state);
+    done.front() = progress_.later[l].states.front();
+    SceneState state = states_before(l)[static_cast<std::size_t>(index)];
+    give_bias(state);
+    progress_.colors.net = colors_after(index).net;
+    for (std::size_t i = l; i < end; ++i) {
+      run_in_frame(later_stage() + i, {index, frame, progress_.covered, done}, state, progress_.colors,
+                   progress_.later[i].totals);
+      progress_.later[i].states.push_back(state);
+    }
+    if (progress_.bias) hsi4d::remove_depth_bias(clip_, *progress_.bias, progress_.later[end - 1].states.back());
+    if (moves_colors(l, end)) write_color_net(net_file(index, pass_), *progress_.colors.net);
+    const std::size_t surest = surest_stage_.value_or(0);
+    if (later_stage() + l <= surest && surest < later_stage() + end)
+      progress_.sigmas[static_cast<std::size_t>(index)] = sigmas_;
+    progress_.seconds += seconds_since(begin);
+    save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
+    if (events_) events_->end_frame(index);
+  }
+
+  /// What images pull a state to, before the bias was taken from it.
+  void give_bias(SceneState& state) const {
+    if (!progress_.bias) return;
+    DepthBias inverse = *progress_.bias;
+    inverse.human = 1 / inverse.human;
+    for (double& factor : inverse.objects) factor = 1 / factor;
+    hsi4d::remove_depth_bias(clip_, inverse, state);
+  }
+
+  /// Where a later stage begins, by frame.
+  const std::vector<SceneState>& states_before(std::size_t l) const {
+    return l == 0 ? progress_.after_stage.back() : progress_.later[l - 1].states;
+  }
+
+  /// Whether one of some later stages moves the color net or what it reads.
+  bool moves_colors(std::size_t l, std::size_t end) const {
+    if (!progress_.colors.net) return false;
+    for (std::size_t s = later_stage() + l; s < later_stage() + end; ++s) {
+      const auto& moved = config_.stages[s].second.optimize;
+      if (find_entry(moved, "color_net") != nullptr || find_entry(moved, kFeaturesGroup) != nullptr) return true;
+    }
+    return false;
   }
 
   StageTotals run_over_sequence(std::size_t s, std::vector<SceneState>& states) {
@@ -380,16 +495,25 @@ class Reconstruction {
     return {result.iterations, result.rollbacks, result.seconds};
   }
 
-  /// The color net as it was after a frame, in the precision of its file, so that a resumed run has the same.
+  /// The color net as the last whole pass left it in a frame, in the precision of its file, so that a resumed run has
+  /// the same.
   ColorState colors_after(Index frame) const {
     ColorState colors = start_colors_;
-    if (frame >= first_worked_on() && colors.net && moves_colors(config_))
-      colors.net = read_color_net(folder_.paths().frame_color_net(static_cast<int>(frame)), clip_.avatar.count(),
+    if (frame >= first_worked_on() && colors.net && hsi4d::moves_colors(config_))
+      colors.net = read_color_net(net_file(frame, frame == 0 ? 1 : colors_pass_), clip_.avatar.count(),
                                   clip_.avatar.joint_count());
     return colors;
   }
 
-  const std::vector<SceneState>& result() const { return result_of(progress_, refinement_); }
+  /// Where a pass keeps the color net of a frame.
+  std::string net_file(Index frame, int pass) const {
+    const std::filesystem::path file = folder_.paths().frame_color_net(static_cast<int>(frame));
+    if (pass == 1) return file.string();
+    return (file.parent_path() / (file.stem().string() + "_pass" + std::to_string(pass) + file.extension().string()))
+        .string();
+  }
+
+  const std::vector<SceneState>& result() const { return result_of(progress_); }
 
   Index first_worked_on() const { return first_stages_ > 0 ? 0 : 1; }
 
@@ -482,7 +606,11 @@ class Reconstruction {
 
   /// @param frame  the one at hand; that beyond the last: all are done
   void stop_if_asked(Index frame) const {
-    if (observer_.wants_stop()) throw Interrupted(stop_message(frame, clip_.frames(), first_worked_on()));
+    if (!observer_.wants_stop()) return;
+    if (pass_ > 1 && frame < clip_.frames())
+      throw Interrupted("interrupted in frame " + std::to_string(frame) + " of pass " + std::to_string(pass_) +
+                        "; the frames before it and pass " + std::to_string(pass_ - 1) + " are finished and kept");
+    throw Interrupted(stop_message(frame, clip_.frames(), first_worked_on()));
   }
 
   static void add_counters(const RenderCounters& counters, StageTotals& totals, IterationRecord& record) {
@@ -550,10 +678,12 @@ class Reconstruction {
   const Observer& observer_;
   std::string identity_;  // the text that a checkpoint of this run belongs to
   Clip& clip_;
+  StageOrder order_;
   std::size_t first_stages_, frame_stages_;
+  int pass_ = 1;         // through the frames, the one at hand
+  int colors_pass_ = 1;  // the last whole one that moved the color net
   RunProgress progress_;
-  RefinementProgress refinement_;
-  TrackPoints tracks_;                       // of the frames that are done
+  TrackPoints tracks_;                       // of the frames that are done, in this pass
   PlaceSigmas sigmas_;                       // of the frame at hand
   std::optional<std::size_t> surest_stage_;  // which tells them
   const ColorState start_colors_;

@@ -122,22 +122,20 @@ void for_first_frames(const RunConfig& config, const Clip& clip, const RunProgre
 /// Calls add_all(states, means, per_frame) for what every stage that moves the body in all frames left; per_frame is
 /// empty but for the last.
 template <class F>
-void for_stages(const RunConfig& config, const RunProgress& progress, const RefinementProgress& refinement,
-                RunSummary& summary, const F& add_all) {
+void for_stages(const RunConfig& config, const RunProgress& progress, RunSummary& summary, const F& add_all) {
   std::vector<FrameMetrics> none;
-  const std::size_t first = progress.first_frame.size(), refined = first + progress.after_stage.size();
+  const std::size_t first = progress.first_frame.size(), later = first + progress.after_stage.size();
   for (std::size_t s = first; s < config.stages.size(); ++s) {
-    if (s < refined && config.stages[s].second.draw == Draw::kScene) continue;
+    if (config.stages[s].second.draw == Draw::kScene) continue;
     const std::vector<SceneState>& states =
-        s < refined ? progress.after_stage[s - first] : refinement.stages[s - refined].states;
+        s < later ? progress.after_stage[s - first] : progress.later[s - later].states;
     const bool is_last = s + 1 == config.stages.size();
     add_all(states, summary.metrics[s].values, is_last ? summary.per_frame : none);
   }
 }
 
 /// Of the start, of what every stage that moves the body left, and of the result's frames.
-void add_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
-                     const RefinementProgress& refinement, RunSummary& summary) {
+void add_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress, RunSummary& summary) {
   summary.surface = clip.surface_file;
   for_first_frames(config, clip, progress, summary, [&clip](const SceneState& state, MetricValues& values) {
     append_values(penetration_values(penetration_by_frame(clip, {state}).front()), values);
@@ -150,7 +148,7 @@ void add_penetration(const RunConfig& config, const Clip& clip, const RunProgres
       append_values(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
   };
   add_all(start_of(clip), summary.baselines[0].values, summary.baselines[0].per_frame);
-  for_stages(config, progress, refinement, summary, add_all);
+  for_stages(config, progress, summary, add_all);
 }
 
 /// How much of the body is inside of the objects, by what their Gaussians show.
@@ -181,8 +179,7 @@ class ObjectPenetration {
 
 /// Contact of the hands, what is inside of objects, height and sliding of the feet and distances from keypoints, which
 /// need no truth: of the baselines, of what every stage that moves the body left, and of the result's frames.
-void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress,
-                 const RefinementProgress& refinement, RunSummary& summary) {
+void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress, RunSummary& summary) {
   const std::vector<const Gaussians*> objects = objects_of(clip);
   const ObjectPenetration inside(clip);
   const auto by_frame = [&](const std::vector<SceneState>& states) {
@@ -222,7 +219,7 @@ void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& p
     add_all(is_copy ? std::vector(static_cast<std::size_t>(clip.frames()), clip.first) : start_of(clip),
             baseline.values, baseline.per_frame);
   }
-  for_stages(config, progress, refinement, summary, add_all);
+  for_stages(config, progress, summary, add_all);
 }
 
 /// How sure the result's places are.
@@ -254,12 +251,11 @@ FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw) {
   return frame;
 }
 
-RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress,
-                         const RefinementProgress& refinement) {
+RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress) {
   RunSummary summary;
   summary.name = config.name;
   summary.frames = static_cast<int>(clip.frames());
-  summary.seconds = progress.seconds + refinement.seconds;
+  summary.seconds = progress.seconds;
   summary.has_truth = clip.truth.has_value();
   summary.is_on_plate = is_plate_file(config.data.scene);
   summary.found = unknowns_by_name(progress.unknowns, clip);
@@ -274,25 +270,25 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
                                               totals));
   };
   if (clip.truth) {
-    add_errors(clip, result_of(progress, refinement), points, summary);
+    add_errors(clip, result_of(progress), points, summary);
   } else {
     summary.baselines = {{"start", motion_jitter(placed(clip, start_of(clip), Draw::kAll), clip.frame_rate), {}}};
   }
   add_first_frame(config, clip, progress, summary);
   for (std::size_t s = 0; s < progress.after_stage.size(); ++s) add_stage(progress.after_stage[s], progress.totals[s]);
-  const std::size_t last_of_frames = summary.metrics.size() - 1;
-  for (const RefinedStates& refined : refinement.stages) add_stage(refined.states, refined.totals);
-  const bool is_refined = !refinement.stages.empty();
-  if (is_refined) {
-    std::vector<FrameMetrics> before_refinement;
-    add_image_errors(progress.image_errors, summary.metrics[last_of_frames].values, before_refinement);
+  const std::size_t last_of_pass = summary.metrics.size() - 1;
+  for (const LaterStage& stage : progress.later) add_stage(stage.states, stage.totals);
+  const bool has_later = !progress.later.empty();
+  if (has_later) {
+    std::vector<FrameMetrics> before;
+    add_image_errors(progress.image_errors, summary.metrics[last_of_pass].values, before);
   }
-  add_image_errors(is_refined ? refinement.image_errors : progress.image_errors, summary.metrics.back().values,
+  add_image_errors(has_later ? progress.result_errors : progress.image_errors, summary.metrics.back().values,
                    summary.per_frame);
   add_image_errors(progress.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
-  add_contact(config, clip, progress, refinement, summary);
-  if (clip.surface) add_penetration(config, clip, progress, refinement, summary);
-  add_sigmas(clip, result_of(progress, refinement), progress.sigmas, summary);
+  add_contact(config, clip, progress, summary);
+  if (clip.surface) add_penetration(config, clip, progress, summary);
+  add_sigmas(clip, result_of(progress), progress.sigmas, summary);
   summary.quality = quality_of(summary.metrics.back().values, clip.frame_rate);
   return summary;
 }

@@ -15,10 +15,9 @@ namespace hsi4d {
 FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw = Draw::kAll);
 
 /// The summary of a run that is at its end. Errors of poses are there where the clip has truth; those of images always
-/// are, at the last stage and at the last before the refinement; penetration where the clip has a surface.
-/// @param progress, refinement  all frames and all stages are done
-RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress,
-                         const RefinementProgress& refinement);
+/// are, at the last stage and at the last of the first pass; penetration where the clip has a surface.
+/// @param progress  all frames and all stages are done
+RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress);
 
 /// Adds what the stages that measure them found of shares of the gradient: from the lines of metrics.jsonl, which a run
 /// that was resumed has whole.

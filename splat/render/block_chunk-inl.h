@@ -105,7 +105,7 @@ struct UW {
 /// @param origin  u and w where x = y = 0
 HWY_INLINE UW uw_at(const PackedSplat& g, const float* origin, V x, V y) {
   const D d;
-  return {hn::MulAdd(hn::Set(d, g.l11), x, hn::MulAdd(hn::Set(d, g.l21), y, hn::Set(d, origin[0]))),
+  return {hn::MulAdd(hn::Set(d, g.l21), y, hn::MulAdd(hn::Set(d, g.l11), x, hn::Set(d, origin[0]))),
           hn::MulAdd(hn::Set(d, g.l22), y, hn::Set(d, origin[1]))};
 }
 
@@ -124,9 +124,12 @@ HWY_INLINE V exact_alpha(const PackedSplat& g, const float* origin, V x, V y) {
 
 // --- blocks ----------------------------------------------------------------------------------------------------------
 
+/// Vectors that x of a block's pixels takes: the parts are rows, whose x are the same.
+constexpr int kColumns = kLanes < 4 ? 4 : 1;
+
 /// A block's pixels: centres from the tile's centre, and the constants of compositing.
 struct Block {
-  V x[kParts], y[kParts];
+  V x[kColumns], y[kParts];
   V col[kParts], row[kParts];  ///< from the block's centre
   V least, least_alpha, stop, cap;
   float center_x, center_y;
@@ -143,9 +146,9 @@ struct Block {
       ys[i] = center_y + static_cast<float>(i / 4) - 1.5f;
     }
     for (int j = 0; j < kParts; ++j) {
-      x[j] = hn::Load(d, xs + j * kLanes);
+      if (j < kColumns) x[j] = hn::Load(d, xs + j * kLanes);
       y[j] = hn::Load(d, ys + j * kLanes);
-      col[j] = hn::Sub(x[j], hn::Set(d, center_x));
+      col[j] = hn::Sub(x[j % kColumns], hn::Set(d, center_x));
       row[j] = hn::Sub(y[j], hn::Set(d, center_y));
     }
     least = hn::Set(d, least_log2(rules.alpha_min));
@@ -155,40 +158,56 @@ struct Block {
   }
 };
 
-/// What compositing one Gaussian makes of one part of a block.
-struct Blended {
-  M drawn;
-  V alpha, weight;
-  V full;  ///< α before the cap; only in the general form
+/// What a Gaussian is in one part of a block, whatever lies in front of it.
+struct Shade {
+  V alpha;   ///< masked
+  V full;    ///< before the cap
+  M passed;  ///< where α is not below the least
 };
 
 /// One Gaussian at part j of a block, at list position `at`.
 template <Form kForm>
-HWY_INLINE Blended composite_one(const BlockWorkspace& space, const PackedSplat& g, Index at, const Block& b, int j,
-                                 bool exclusive, V& t) {
-  constexpr bool kExact = kForm == Form::kExact, kGeneral = kForm != Form::kPlain;
+HWY_INLINE Shade shade(const BlockWorkspace& space, const Block& b, Index at, int j) {
+  const PackedSplat& g = space.packed[space.list[at]];
+  Shade s;
+  if constexpr (kForm == Form::kExact) {
+    s.full = exact_alpha(g, space.centers + 2 * at, b.col[j], b.row[j]);
+    s.passed = hn::Ge(s.full, b.least_alpha);
+  } else {
+    const V p = log2_alpha(g, &g.u0, b.x[j % kColumns], b.y[j]);
+    s.full = exp2_of<false>(p);
+    s.passed = hn::Ge(p, b.least);
+  }
+  s.alpha = masked(s.passed, kForm == Form::kPlain ? s.full : hn::Min(s.full, b.cap));
+  return s;
+}
+
+/// Four Gaussians from list position `at` on: none waits for another.
+template <Form kForm>
+HWY_INLINE void shade_four(const BlockWorkspace& space, const Block& b, Index at, Shade (&shades)[4][kParts]) {
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < kParts; ++j) shades[i][j] = shade<kForm>(space, b, at + i, j);
+  }
+}
+
+/// What compositing a Gaussian makes of one part of a block.
+struct Blended {
+  Drawn drawn;
+  V weight;
+};
+
+template <Form kForm>
+HWY_INLINE Blended blend(const Shade& s, const Block& b, bool exclusive, V& t) {
   Blended r;
-  V tried, least;  // what is compared with the threshold
-  if constexpr (kExact) {
-    tried = r.full = exact_alpha(g, space.centers + 2 * at, b.col[j], b.row[j]);
-    least = b.least_alpha;
-  } else {
-    tried = log2_alpha(g, &g.u0, b.x[j], b.y[j]);
-    r.full = exp2_of<false>(tried);
-    least = b.least;
+  r.drawn = drawn_where(s.passed, s.alpha, t, b.stop);
+  M past;
+  if (kForm != Form::kPlain && exclusive) {
+    past = hn::And(is_drawn(r.drawn), hn::Lt(behind(r.drawn, t), b.stop));
+    r.drawn = without(r.drawn, past);
   }
-  r.alpha = kGeneral ? hn::Min(r.full, b.cap) : r.full;
-  r.drawn = both_at_least(tried, least, t, b.stop);
-  if (kGeneral && exclusive) {
-    const V next = hn::NegMulAdd(t, r.alpha, t);
-    const M past = hn::And(r.drawn, hn::Lt(next, b.stop));
-    r.drawn = hn::AndNot(past, r.drawn);
-    r.weight = product_or_zero(r.drawn, t, r.alpha);
-    t = hn::IfThenElse(past, hn::Neg(t), hn::IfThenElse(r.drawn, next, t));  // finished pixels are negative
-  } else {
-    r.weight = product_or_zero(r.drawn, t, r.alpha);
-    t = dimmed(r.drawn, t, r.alpha);
-  }
+  r.weight = weight_of(r.drawn, t);
+  t = behind(r.drawn, t);
+  if (kForm != Form::kPlain && exclusive) t = hn::IfThenElse(past, hn::Neg(t), t);  // finished pixels are negative
   return r;
 }
 
@@ -264,11 +283,12 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
   const std::span<const TileEntry> entries = chunk.entries;
   const size_t size = entries.size();
   constexpr size_t kAhead = 12;
+  constexpr bool kInRecords = kChannels > 0 && kChannels <= RecordFeatures<float>::kCount;
   for (size_t at = 0; at < size; ++at) {
     if (at + kAhead < size && (entries[at + kAhead].blocks & blocks) != 0) {
       const auto next = entries[at + kAhead].index;
       hwy::Prefetch(&scene.records[static_cast<size_t>(next)]);  // one cache line
-      hwy::Prefetch(scene.feature(next));
+      if (!kInRecords) hwy::Prefetch(scene.feature(next));
     }
     const std::uint32_t touched = entries[at].blocks & blocks;
     space.blocks[at] = static_cast<std::int32_t>(touched);
@@ -277,7 +297,7 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
     pack_splat(r, center, space.packed[at]);
     chunk.near_cap |= r.log2_opacity > cap;
-    const float* const feature = scene.feature(index);
+    const float* const feature = kInRecords ? r.features.numbers : scene.feature(index);
     float* const to = space.features + static_cast<Index>(at) * channels;
     for (Index k = 0; k < channels; ++k) to[k] = feature[k];
   }

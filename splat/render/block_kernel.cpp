@@ -6,8 +6,9 @@
 // The backward pass replays a segment of a block's list from a kept T, by the same functions in the same order, so
 // that it finds the same α, the same T and the same end (row B13), and keeps α and w = T α of the segment. From the
 // back, v = w (g·f − S) and S ← S + α (g·f − S): nothing is divided (row B2). Sums over the pixels of a block are
-// made of 16 Gaussians at a time: 4×4 transposes make lanes of Gaussians, and the moments {1, x, y, x², xy, y²} of v
-// follow by rows. About the block's centre they are small numbers; they are moved to u and w there (row A1: needles).
+// made of as many Gaussians at a time as there are lanes: 4×4 transposes make lanes of Gaussians, and the moments
+// {1, x, y, x², xy, y²} of v follow by rows. About the block's centre they are small numbers; they are moved to u and w
+// there (row A1: needles).
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "splat/render/block_kernel.cpp"
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
@@ -52,12 +53,12 @@ Index composite_list(const CompositeScene<float>& scene, const BlockWorkspace& s
       for (int j = 0; j < kParts; ++j) hn::Store(t[j], d, checkpoints + j * kLanes);
       checkpoints += kBlockPixels;
     }
-    for (const Index stop = at + 4; at < stop; ++at) {
-      const Index place = space.list[at];
-      const PackedSplat& g = space.packed[place];
-      const float* const feature = space.features + place * channels;
+    Shade shades[4][kParts];
+    shade_four<kForm>(space, b, at, shades);
+    for (int i = 0; i < 4; ++i, ++at) {
+      const float* const feature = space.features + space.list[at] * channels;
       for (int j = 0; j < kParts; ++j) {
-        const Blended one = composite_one<kForm>(space, g, at, b, j, exclusive, t[j]);
+        const Blended one = blend<kForm>(shades[i][j], b, exclusive, t[j]);
         keep_bits(one.drawn, j, space.drawn + at);
         if constexpr (kChannels > 0) {
           for (int k = 0; k < kChannels; ++k) c[k][j] = hn::MulAdd(one.weight, hn::Set(d, feature[k]), c[k][j]);
@@ -145,7 +146,7 @@ BlockCounts forward(Index side, const CompositeScene<float>& scene, const BlockJ
 
 // --- backward --------------------------------------------------------------------------------------------------------
 
-/// α and weights of list positions [begin, end), from T in front of them.
+/// α and weights of list positions [begin, end), a multiple of four, from T in front of them.
 template <Form kForm>
 void replay(const CompositeScene<float>& scene, const BlockWorkspace& space, const Block& b, Index begin, Index end,
             const float* first) {
@@ -153,18 +154,20 @@ void replay(const CompositeScene<float>& scene, const BlockWorkspace& space, con
   const bool exclusive = scene.rules.exclusive, pass = scene.rules.pass_cap;
   V t[kParts];
   for (int j = 0; j < kParts; ++j) t[j] = hn::Load(d, first + j * kLanes);
-  for (Index at = begin; at < end; ++at) {
-    const PackedSplat& g = space.packed[space.list[at]];
-    const Index place = (at - begin) * kBlockPixels;
-    for (int j = 0; j < kParts; ++j) {
-      const V through = t[j];
-      const Blended one = composite_one<kForm>(space, g, at, b, j, exclusive, t[j]);
-      hn::Store(hn::IfThenElseZero(one.drawn, one.alpha), d, space.alpha + place + j * kLanes);
-      hn::Store(one.weight, d, space.weight + place + j * kLanes);
-      if (kForm != Form::kPlain) {
-        const M held = hn::Gt(one.full, b.cap);
-        const V passed = pass ? product_or_zero(one.drawn, through, one.full) : hn::Zero(d);
-        hn::Store(hn::IfThenElse(held, passed, one.weight), d, space.gradient_weight + place + j * kLanes);
+  for (Index at = begin; at < end;) {
+    Shade shades[4][kParts];
+    shade_four<kForm>(space, b, at, shades);
+    for (int i = 0; i < 4; ++i, ++at) {
+      for (int j = 0; j < kParts; ++j) {
+        const Index lane = (at - begin) * kBlockPixels + j * kLanes;
+        const V through = t[j], full = shades[i][j].full;
+        const Blended one = blend<kForm>(shades[i][j], b, exclusive, t[j]);
+        hn::Store(alpha_of(one.drawn), d, space.alpha + lane);
+        hn::Store(one.weight, d, space.weight + lane);
+        if (kForm != Form::kPlain) {
+          const V passed = pass ? hn::IfThenElseZero(is_drawn(one.drawn), hn::Mul(through, full)) : hn::Zero(d);
+          hn::Store(hn::IfThenElse(hn::Gt(full, b.cap), passed, one.weight), d, space.gradient_weight + lane);
+        }
       }
     }
   }
@@ -195,7 +198,9 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
   const Index channels = kChannels > 0 ? kChannels : scene.channels;
   const int quads = static_cast<int>((size + 3) / 4);
   BatchSums sums;
-  for (int q = 3; q >= 0; --q) {
+  V behind[kParts];
+  for (int j = 0; j < kParts; ++j) behind[j] = gradient.behind[j];
+  for (int q = kQuads - 1; q >= 0; --q) {
     if (q >= quads) {
       for (int j = 0; j < kParts; ++j) {
         for (auto& m : sums.moments) m[q][j] = hn::Zero(d);
@@ -213,11 +218,11 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
         for (Index k = 1; k < channels; ++k) {
           shown = hn::MulAdd(hn::Load(d, gradient.g[k] + j * kLanes), hn::Set(d, feature[k]), shown);
         }
-        const V difference = hn::Sub(shown, gradient.behind[j]);
+        const V difference = hn::Sub(shown, behind[j]);
         weights[i][j] = hn::Load(d, space.weight + lane);
         v[i][j] =
             hn::Mul(kForm != Form::kPlain ? hn::Load(d, space.gradient_weight + lane) : weights[i][j], difference);
-        gradient.behind[j] = hn::MulAdd(hn::Load(d, space.alpha + lane), difference, gradient.behind[j]);
+        behind[j] = hn::MulAdd(hn::Load(d, space.alpha + lane), difference, behind[j]);
       }
     }
     if (adjoint.wants_shape) {
@@ -239,33 +244,32 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
       }
     }
   }
+  for (int j = 0; j < kParts; ++j) gradient.behind[j] = behind[j];
   const Index stride = block_slot(channels);
-  const float* splats[16];
-  float* places[16];
-  for (int i = 0; i < 16; ++i) {
+  const float* splats[kBatch];
+  float* places[kBatch];
+  for (int i = 0; i < kBatch; ++i) {
     splats[i] = &space.packed[list[i]].l11;
     places[i] = space.sums + list[i] * stride;
   }
   const Index used = kMoments + (adjoint.wants_features ? channels : 0);
-  Sixteen of[(kMoments + kMostBlockChannels + 3) / 4 * 4];
+  OfBatch of[(kMoments + kMostBlockChannels + 3) / 4 * 4];
   for (Index i = used; i < (used + 3) / 4 * 4; ++i) {
     for (V& part : of[i].v) part = hn::Zero(d);
   }
   if (adjoint.wants_shape) {
-    Sixteen moments[kMoments];
     if constexpr (kForm == Form::kExact) {
-      for (int m = 0; m < kMoments; ++m) moments[m] = sum_over_rows(sums.moments[m]);
+      for (int m = 0; m < kMoments; ++m) sum_over_rows(sums.moments[m], of[m]);
     } else {
-      block_moments(b, sums, moments);
-      to_uw(splats, b, moments);
+      block_moments(b, sums, of);
+      to_uw(splats, b, of);
     }
-    for (int m = 0; m < kMoments; ++m) of[m] = moments[m];
   } else {
     for (int m = 0; m < kMoments; ++m) {
       for (V& part : of[m].v) part = hn::Zero(d);
     }
   }
-  for (Index k = kMoments; k < used; ++k) of[k] = sum_over_rows(sums.features[k - kMoments]);
+  for (Index k = kMoments; k < used; ++k) sum_over_rows(sums.features[k - kMoments], of[k]);
   Index first = adjoint.wants_shape ? 0 : 4;
 #if HWY_CAP_GE256
   if (first == 0) {
@@ -273,11 +277,7 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
     first = 8;
   }
 #endif
-  for (; first < used; first += 4) {
-    float* to[16];
-    for (int i = 0; i < 16; ++i) to[i] = places[i] + first;
-    add_fours(of[first], of[first + 1], of[first + 2], of[first + 3], to);
-  }
+  for (; first < used; first += 4) add_fours(of + first, places, first);
 }
 
 template <int kChannels, Form kForm>
@@ -298,9 +298,9 @@ void adjoint_of_list(Index side, const CompositeScene<float>& scene, const Block
       std::memcpy(first, job.checkpoints + kept * kBlockPixels, sizeof first);
     }
     replay<kForm>(scene, space, b, begin, padded, first);
-    for (Index batch = (end - begin - 1) / 16 * 16; batch >= 0; batch -= 16) {
+    for (Index batch = (end - begin - 1) / kBatch * kBatch; batch >= 0; batch -= kBatch) {
       adjoint_of_batch<kChannels, kForm>(scene, space, b, adjoint, begin, batch,
-                                         std::min<Index>(16, end - begin - batch), gradient);
+                                         std::min<Index>(kBatch, end - begin - batch), gradient);
     }
   }
 }
@@ -426,7 +426,7 @@ PixelAlpha<float> pixel_of_block(Index side, const SplatRecord<float>& record, c
 float behind_pixel(float transmittance, float alpha) {
   const D d;
   const V t = hn::Set(d, transmittance), a = hn::Set(d, alpha);
-  return hn::GetLane(dimmed(hn::Eq(t, t), t, a));
+  return hn::GetLane(hn::NegMulAdd(t, a, t));
 }
 
 }  // namespace hsi4d::detail::HWY_NAMESPACE

@@ -48,43 +48,69 @@ using MI = hn::Mask<DI>;
 
 // --- a few instructions that Highway has no name for -----------------------------------------------------------------
 
+/// ⌊p⌋, and p − ⌊p⌋.
+struct Parted {
+  V whole, fraction;
+};
+
 #if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
-HWY_INLINE M both_at_least(V a, V b, V c, V d) {
-  return M{_mm512_mask_cmp_ps_mask(_mm512_cmp_ps_mask(a.raw, b.raw, _CMP_GE_OQ), c.raw, d.raw, _CMP_GE_OQ)};
+/// α of a Gaussian in the pixels that it is composited in.
+struct Drawn {
+  M where;
+  V alpha;  ///< elsewhere any number
+};
+/// α for drawn_where, with any number where it has not passed.
+HWY_INLINE V masked(M, V a) { return a; }
+HWY_INLINE Drawn drawn_where(M passed, V a, V t, V stop) {
+  return {M{_mm512_mask_cmp_ps_mask(passed.raw, t.raw, stop.raw, _CMP_GE_OQ)}, a};
 }
-HWY_INLINE V product_or_zero(M m, V a, V b) { return V{_mm512_maskz_mul_ps(m.raw, a.raw, b.raw)}; }
-/// t − t a where m, else t.
-HWY_INLINE V dimmed(M m, V t, V a) { return V{_mm512_mask_fnmadd_ps(t.raw, m.raw, a.raw, t.raw)}; }
-HWY_INLINE V fraction(V p) { return V{_mm512_reduce_ps(p.raw, 0x09)}; }
+HWY_INLINE M is_drawn(Drawn x) { return x.where; }
+HWY_INLINE Drawn without(Drawn x, M past) { return {hn::AndNot(past, x.where), x.alpha}; }
+HWY_INLINE V alpha_of(Drawn x) { return hn::IfThenElseZero(x.where, x.alpha); }
+HWY_INLINE V weight_of(Drawn x, V t) { return V{_mm512_maskz_mul_ps(x.where.raw, t.raw, x.alpha.raw)}; }
+HWY_INLINE V behind(Drawn x, V t) { return V{_mm512_mask_fnmadd_ps(t.raw, x.where.raw, x.alpha.raw, t.raw)}; }
+HWY_INLINE Parted parted(V p) { return {p, V{_mm512_reduce_ps(p.raw, 0x09)}}; }  // scalef takes the floor itself
 HWY_INLINE V rest_of_rounding(V p) { return V{_mm512_reduce_ps(p.raw, 0x08)}; }
-HWY_INLINE V times_power_of_floor(V y, V p) { return V{_mm512_scalef_ps(y.raw, p.raw)}; }
-HWY_INLINE void keep_bits(M m, int, std::uint16_t* to) { _store_mask16(to, m.raw); }
+HWY_INLINE V times_power_of(V y, V whole) { return V{_mm512_scalef_ps(y.raw, whole.raw)}; }
+HWY_INLINE void keep_bits(Drawn x, int, std::uint16_t* to) { _store_mask16(to, x.where.raw); }
 /// first, first + 1, … of the lanes where m, one behind the other; writes a whole vector, returns how many count.
 HWY_INLINE size_t store_chosen(VI place, MI m, std::int32_t* to) { return hn::CompressStore(place, m, DI(), to); }
 #else
 #if HWY_TARGET == HWY_SCALAR
-/// y 2^⌊p⌋ for y in [1, 2) and p ≥ −126; for smaller p some number.
-HWY_INLINE V times_power_of_floor(V y, V p) {
-  const float floor = std::floor(std::max(hn::GetLane(p), -126.0f));
+/// y 2ⁿ for y in [½, 2) and a whole number n ≥ −126; for smaller n some number.
+HWY_INLINE V times_power_of(V y, V n) {
+  const float held = std::max(hn::GetLane(n), -126.0f);
   return hn::Set(D(), std::bit_cast<float>(std::bit_cast<std::int32_t>(hn::GetLane(y)) +
-                                           static_cast<std::int32_t>(floor) * (1 << 23)));
+                                           static_cast<std::int32_t>(held) * (1 << 23)));
 }
 #else
-/// The same.
-HWY_INLINE V times_power_of_floor(V y, V p) {
-  const hn::RebindToSigned<D> di;
-  const auto n = hn::ConvertTo(di, hn::Floor(hn::Max(p, hn::Set(D(), -126.0f))));
-  return hn::BitCast(D(), hn::Add(hn::BitCast(di, y), hn::ShiftLeft<23>(n)));
+/// The same. The sum of 1.5 · 2²³ and a whole number has that number in its lowest bits.
+HWY_INLINE V times_power_of(V y, V n) {
+  const DI di;
+  const VI exponent = hn::BitCast(di, hn::Add(n, hn::Set(D(), 12582912.0f)));
+  return hn::BitCast(D(), hn::Add(hn::BitCast(di, y), hn::ShiftLeft<23>(exponent)));
 }
 #endif
-HWY_INLINE M both_at_least(V a, V b, V c, V d) { return hn::And(hn::Ge(a, b), hn::Ge(c, d)); }
-HWY_INLINE V product_or_zero(M m, V a, V b) { return hn::IfThenElseZero(m, hn::Mul(a, b)); }
-HWY_INLINE V dimmed(M m, V t, V a) { return hn::NegMulAdd(t, hn::IfThenElseZero(m, a), t); }
-HWY_INLINE V fraction(V p) { return hn::Sub(p, hn::Floor(p)); }
+/// α of a Gaussian in the pixels that it is composited in, elsewhere 0.
+struct Drawn {
+  V alpha;
+};
+/// α for drawn_where: 0 where it has not passed.
+HWY_INLINE V masked(M passed, V a) { return hn::IfThenElseZero(passed, a); }
+HWY_INLINE Drawn drawn_where(M, V a, V t, V stop) { return {hn::IfThenElseZero(hn::Ge(t, stop), a)}; }
+HWY_INLINE M is_drawn(Drawn x) { return hn::Gt(x.alpha, hn::Zero(D())); }
+HWY_INLINE Drawn without(Drawn x, M past) { return {hn::IfThenZeroElse(past, x.alpha)}; }
+HWY_INLINE V alpha_of(Drawn x) { return x.alpha; }
+HWY_INLINE V weight_of(Drawn x, V t) { return hn::Mul(t, x.alpha); }
+HWY_INLINE V behind(Drawn x, V t) { return hn::NegMulAdd(t, x.alpha, t); }
+HWY_INLINE Parted parted(V p) {
+  const V whole = hn::Floor(p);
+  return {whole, hn::Sub(p, whole)};
+}
 HWY_INLINE V rest_of_rounding(V p) { return hn::Sub(p, hn::Round(p)); }
-HWY_INLINE void keep_bits(M m, int part, std::uint16_t* to) {
+HWY_INLINE void keep_bits(Drawn x, int part, std::uint16_t* to) {
   std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(D(), m, bits);
+  hn::StoreMaskBits(D(), is_drawn(x), bits);
   *to = static_cast<std::uint16_t>((part == 0 ? 0 : *to) | bits[0] << (part * kLanes));
 }
 /// The same by a table: GCC 12 copies that of Highway's CompressStore, of 1 KiB, to the stack in every call.
@@ -111,23 +137,27 @@ HWY_INLINE V exp2_of(V p) {
                           0.693147202855229f, 1.0f}) {
       y = hn::MulAdd(y, f, hn::Set(d, c));
     }
-    return hn::IfThenElseZero(hn::Ge(p, hn::Set(d, -126.0f)), times_power_of_floor(y, hn::Sub(p, f)));
+    return hn::IfThenElseZero(hn::Ge(p, hn::Set(d, -126.0f)), times_power_of(y, hn::Sub(p, f)));
   } else {
-    const V f = fraction(p);
-    V y = hn::Set(d, 0.0018671309482703458f);
-    for (const float c :
-         {0.009017028235494745f, 0.05579991480382185f, 0.24016444961251981f, 0.6931513118582556f, 1.0f}) {
-      y = hn::MulAdd(y, f, hn::Set(d, c));
-    }
-    return times_power_of_floor(y, p);
+    const auto [whole, f] = parted(p);
+    // The inner terms in pairs: one more multiplication, and four cycles less to wait for.
+    const V high = hn::MulAdd(hn::Set(d, 0.0018671309482703458f), f, hn::Set(d, 0.009017028235494745f));
+    const V low = hn::MulAdd(hn::Set(d, 0.05579991480382185f), f, hn::Set(d, 0.24016444961251981f));
+    const V inner = hn::MulAdd(hn::MulAdd(high, hn::Mul(f, f), low), f, hn::Set(d, 0.6931513118582556f));
+    const V y = hn::MulAdd(inner, f, hn::Set(d, 1.0f));
+    return times_power_of(y, whole);
   }
 }
 
 // --- lanes of pixels to lanes of Gaussians ---------------------------------------------------------------------------
 
-/// Sixteen numbers, one of each Gaussian of a batch.
-struct Sixteen {
-  V v[kParts];
+/// Gaussians whose sums over pixels are made together, in quads: as many as there are lanes.
+constexpr int kQuads = kLanes > 4 ? kLanes / 4 : 1, kBatch = 4 * kQuads;
+
+/// A number of each Gaussian of a batch. Not to be copied: GCC moves it in pieces of 16 bytes, for which the whole
+/// vectors that are read afterwards have to wait.
+struct OfBatch {
+  V v[kBatch / kLanes];
 };
 
 #if HWY_TARGET == HWY_SCALAR
@@ -140,28 +170,25 @@ void transpose4(V (&v)[4][kParts]) {
   }
 }
 
-/// Vectors with lanes [row][Gaussian] for the four quads of a batch, summed over rows.
-Sixteen sum_over_rows(const V (&quads)[4][kParts]) {
-  Sixteen r;
-  for (int i = 0; i < 16; ++i) {
-    const V* const of = quads[i / 4] + i % 4;
+/// Vectors with lanes [row][Gaussian] for the quads of a batch, summed over rows.
+void sum_over_rows(const V (&quads)[kQuads][kParts], OfBatch& r) {
+  for (int i = 0; i < kBatch; ++i) {
+    const V* const of = quads[0] + i;
     r.v[i] = hn::Add(hn::Add(of[0], of[4]), hn::Add(of[8], of[12]));
   }
-  return r;
 }
 
-/// Four numbers from each of 16 places, as lanes of places.
-void load_fours(const float* const (&places)[16], Sixteen (&out)[4]) {
-  for (int i = 0; i < 16; ++i) {
+/// Four numbers from each of some places, as lanes of places.
+void load_fours(const float* const (&places)[kBatch], OfBatch (&out)[4]) {
+  for (int i = 0; i < kBatch; ++i) {
     for (int k = 0; k < 4; ++k) out[k].v[i] = hn::Set(D(), places[i][k]);
   }
 }
 
-/// Adds four numbers to each of 16 places.
-void add_fours(const Sixteen& a, const Sixteen& b, const Sixteen& c, const Sixteen& e, float* const (&places)[16]) {
-  for (int i = 0; i < 16; ++i) {
-    const V* const of[4] = {&a.v[i], &b.v[i], &c.v[i], &e.v[i]};
-    for (int k = 0; k < 4; ++k) places[i][k] += hn::GetLane(*of[k]);
+/// Adds four numbers to each of some places.
+void add_fours(const OfBatch* of, float* const (&places)[kBatch], Index first) {
+  for (int i = 0; i < kBatch; ++i) {
+    for (int k = 0; k < 4; ++k) places[i][first + k] += hn::GetLane(of[k].v[i]);
   }
 }
 #else
@@ -203,24 +230,18 @@ HWY_INLINE void transpose_blocks(V& a, V& b, V& c, V& e) {
 }
 #endif
 
-/// Vectors with lanes [row][Gaussian] for the four quads of a batch, summed over rows.
-HWY_INLINE Sixteen sum_over_rows(const V (&quads)[4][kParts]) {
-  Sixteen r;
+/// Vectors with lanes [row][Gaussian] for the quads of a batch, summed over rows.
+HWY_INLINE void sum_over_rows(const V (&quads)[kQuads][kParts], OfBatch& r) {
 #if HWY_CAP_GE512
   const V even = sums_of_halves(quads[0][0], quads[2][0]), odd = sums_of_halves(quads[1][0], quads[3][0]);
   // blocks of 128 bits: quads 0 0 2 2, and 1 1 3 3
   r.v[0] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(odd), even),
                    hn::OddEvenBlocks(odd, hn::SwapAdjacentBlocks(even)));
 #elif HWY_CAP_GE256
-  for (int q = 0; q < 4; q += 2) {
-    r.v[q / 2] = sums_of_halves(hn::Add(quads[q][0], quads[q][1]), hn::Add(quads[q + 1][0], quads[q + 1][1]));
-  }
+  r.v[0] = sums_of_halves(hn::Add(quads[0][0], quads[0][1]), hn::Add(quads[1][0], quads[1][1]));
 #else
-  for (int q = 0; q < 4; ++q) {
-    r.v[q] = hn::Add(hn::Add(quads[q][0], quads[q][1]), hn::Add(quads[q][2], quads[q][3]));
-  }
+  r.v[0] = hn::Add(hn::Add(quads[0][0], quads[0][1]), hn::Add(quads[0][2], quads[0][3]));
 #endif
-  return r;
 }
 
 /// Four numbers from places 0, 4, … of `from`, as 128 bits each.
@@ -239,51 +260,44 @@ HWY_INLINE V blocks_from(const float* const* from) {
 #endif
 }
 
-/// Four numbers from each of 16 places, as lanes of places.
-HWY_INLINE void load_fours(const float* const (&places)[16], Sixteen (&out)[4]) {
-  for (int j = 0; j < kParts; ++j) {
-    for (int i = 0; i < 4; ++i) out[i].v[j] = blocks_from(places + j * kLanes + i);
-    transpose4(out[0].v[j], out[1].v[j], out[2].v[j], out[3].v[j]);
-  }
+/// Four numbers from each of some places, as lanes of places.
+HWY_INLINE void load_fours(const float* const (&places)[kBatch], OfBatch (&out)[4]) {
+  for (int i = 0; i < 4; ++i) out[i].v[0] = blocks_from(places + i);
+  transpose4(out[0].v[0], out[1].v[0], out[2].v[0], out[3].v[0]);
 }
 
-/// Adds four numbers to each of 16 places.
-HWY_INLINE void add_fours(const Sixteen& a, const Sixteen& b, const Sixteen& c, const Sixteen& e,
-                          float* const (&places)[16]) {
+/// Adds four numbers to each of some places, from number `first` there on.
+HWY_INLINE void add_fours(const OfBatch* of, float* const (&places)[kBatch], Index first) {
   const D d;
   const D4 d4;
-  for (int j = 0; j < kParts; ++j) {
-    V v[4] = {a.v[j], b.v[j], c.v[j], e.v[j]};
-    transpose4(v[0], v[1], v[2], v[3]);
-    HWY_ALIGN float rows[4][kLanes];
-    for (int i = 0; i < 4; ++i) hn::Store(v[i], d, rows[i]);
-    for (int g = 0; g < kLanes; ++g) {
-      float* const to = places[j * kLanes + g];
-      hn::Store(hn::Add(hn::Load(d4, to), hn::Load(d4, rows[g % 4] + g / 4 * 4)), d4, to);
-    }
+  V v[4] = {of[0].v[0], of[1].v[0], of[2].v[0], of[3].v[0]};
+  transpose4(v[0], v[1], v[2], v[3]);
+  HWY_ALIGN float rows[4][kLanes];
+  for (int i = 0; i < 4; ++i) hn::Store(v[i], d, rows[i]);
+  for (int g = 0; g < kBatch; ++g) {
+    float* const to = places[g] + first;
+    hn::Store(hn::Add(hn::Load(d4, to), hn::Load(d4, rows[g % 4] + g / 4 * 4)), d4, to);
   }
 }
 
 #if HWY_CAP_GE256
-/// Adds eight numbers to each of 16 places.
-HWY_INLINE void add_eights(const Sixteen* of, float* const (&places)[16]) {
+/// Adds eight numbers to each of some places.
+HWY_INLINE void add_eights(const OfBatch* of, float* const (&places)[kBatch]) {
   const D d;
   const hn::CappedTag<float, 8> d8;
-  for (int j = 0; j < kParts; ++j) {
-    V low[4] = {of[0].v[j], of[1].v[j], of[2].v[j], of[3].v[j]},
-      high[4] = {of[4].v[j], of[5].v[j], of[6].v[j], of[7].v[j]};
-    transpose4(low[0], low[1], low[2], low[3]);
-    transpose4(high[0], high[1], high[2], high[3]);
-    // Blocks of 128 bits are of places i, i + 4, …: next to those of `low` come those of `high`.
-    HWY_ALIGN float rows[4][2][kLanes];
-    for (int i = 0; i < 4; ++i) {
-      hn::Store(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(high[i]), low[i]), d, rows[i][0]);
-      hn::Store(hn::OddEvenBlocks(high[i], hn::SwapAdjacentBlocks(low[i])), d, rows[i][1]);
-    }
-    for (int g = 0; g < kLanes; ++g) {
-      float* const to = places[j * kLanes + g];
-      hn::StoreU(hn::Add(hn::LoadU(d8, to), hn::Load(d8, rows[g % 4][g / 4 % 2] + g / 8 * 8)), d8, to);
-    }
+  V low[4] = {of[0].v[0], of[1].v[0], of[2].v[0], of[3].v[0]},
+    high[4] = {of[4].v[0], of[5].v[0], of[6].v[0], of[7].v[0]};
+  transpose4(low[0], low[1], low[2], low[3]);
+  transpose4(high[0], high[1], high[2], high[3]);
+  // Blocks of 128 bits are of places i, i + 4, …: next to those of `low` come those of `high`.
+  HWY_ALIGN float rows[4][2][kLanes];
+  for (int i = 0; i < 4; ++i) {
+    hn::Store(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(high[i]), low[i]), d, rows[i][0]);
+    hn::Store(hn::OddEvenBlocks(high[i], hn::SwapAdjacentBlocks(low[i])), d, rows[i][1]);
+  }
+  for (int g = 0; g < kBatch; ++g) {
+    float* const to = places[g];
+    hn::StoreU(hn::Add(hn::LoadU(d8, to), hn::Load(d8, rows[g % 4][g / 4 % 2] + g / 8 * 8)), d8, to);
   }
 }
 #endif

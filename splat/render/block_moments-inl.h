@@ -1,5 +1,5 @@
-// Moments of the block kernel's adjoint: sums over the pixels of a block, of 16 Gaussians at a time. Compiled once for
-// each instruction set.
+// Moments of the block kernel's adjoint: sums over the pixels of a block, of a batch of Gaussians at a time. Compiled
+// once for each instruction set.
 #if defined(HSI4D_SPLAT_BLOCK_MOMENTS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef HSI4D_SPLAT_BLOCK_MOMENTS_INL_H
 #undef HSI4D_SPLAT_BLOCK_MOMENTS_INL_H
@@ -13,10 +13,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace hsi4d::detail::HWY_NAMESPACE {
 
-/// Sums of a batch of up to 16 Gaussians: lanes of Gaussians.
+/// Sums of a batch over the pixels of each row, by quads: lanes of rows and Gaussians.
 struct BatchSums {
-  V moments[kMoments][4][kParts];
-  V features[kMostBlockChannels][4][kParts];
+  V moments[kMoments][kQuads][kParts];
+  V features[kMostBlockChannels][kQuads][kParts];
 };
 
 /// Moments of pixels −1.5, −0.5, 0.5, 1.5 from the centre: 1, x, x².
@@ -44,24 +44,28 @@ HWY_INLINE void quad_moments(V (&v)[4][kParts], int q, BatchSums& sums) {
 }
 
 /// Moments of a batch from those of its rows: 1, x, y, x², x y, y².
-HWY_INLINE void block_moments([[maybe_unused]] const Block& b, BatchSums& sums, Sixteen (&moments)[kMoments]) {
+HWY_INLINE void block_moments([[maybe_unused]] const Block& b, BatchSums& sums, OfBatch* moments) {
 #if HWY_CAP_GE512 && HWY_ARCH_X86
-  V(&one)[4][kParts] = sums.moments[0], (&x)[4][kParts] = sums.moments[1];
+  V(&one)[kQuads][kParts] = sums.moments[0], (&x)[kQuads][kParts] = sums.moments[1];
   transpose_blocks(one[0][0], one[1][0], one[2][0], one[3][0]);
   transpose_blocks(x[0][0], x[1][0], x[2][0], x[3][0]);
   const LineMoments of_one = line_moments(one[0][0], one[1][0], one[2][0], one[3][0]);
   const LineMoments of_x = line_moments(x[0][0], x[1][0], x[2][0], x[3][0]);
-  const V of[kMoments] = {of_one.one, of_x.one, of_one.x, sum_over_rows(sums.moments[3]).v[0], of_x.x, of_one.xx};
-  for (int m = 0; m < kMoments; ++m) moments[m].v[0] = of[m];
+  sum_over_rows(sums.moments[3], moments[3]);
+  moments[0].v[0] = of_one.one;
+  moments[1].v[0] = of_x.one;
+  moments[2].v[0] = of_one.x;
+  moments[4].v[0] = of_x.x;
+  moments[5].v[0] = of_one.xx;
 #else
-  for (int q = 0; q < 4; ++q) {
+  for (int q = 0; q < kQuads; ++q) {
     for (int j = 0; j < kParts; ++j) {
       sums.moments[2][q][j] = hn::Mul(sums.moments[0][q][j], b.row[j]);
       sums.moments[4][q][j] = hn::Mul(sums.moments[1][q][j], b.row[j]);
       sums.moments[5][q][j] = hn::Mul(sums.moments[2][q][j], b.row[j]);
     }
   }
-  for (int m = 0; m < kMoments; ++m) moments[m] = sum_over_rows(sums.moments[m]);
+  for (int m = 0; m < kMoments; ++m) sum_over_rows(sums.moments[m], moments[m]);
 #endif
 }
 
@@ -87,15 +91,15 @@ HWY_INLINE void quad_moments_exact(const BlockWorkspace& space, const Block& b, 
 }
 
 /// Moments in x and y about the block's centre to moments in u and w.
-HWY_INLINE void to_uw(const float* const (&splats)[16], const Block& b, Sixteen (&m)[kMoments]) {
+HWY_INLINE void to_uw(const float* const (&splats)[kBatch], const Block& b, OfBatch* m) {
   const D d;
-  Sixteen low[4], high[4];
-  const float* upper[16];
-  for (int i = 0; i < 16; ++i) upper[i] = splats[i] + 4;
+  OfBatch low[4], high[4];
+  const float* upper[kBatch];
+  for (int i = 0; i < kBatch; ++i) upper[i] = splats[i] + 4;
   load_fours(splats, low);
   load_fours(upper, high);
   const V bx = hn::Set(d, b.center_x), by = hn::Set(d, b.center_y);
-  for (int j = 0; j < kParts; ++j) {
+  for (int j = 0; j < kBatch / kLanes; ++j) {
     const V l11 = low[0].v[j], l21 = low[1].v[j], l22 = low[2].v[j];
     const V u = hn::MulAdd(l11, bx, hn::MulAdd(l21, by, high[0].v[j])), w = hn::MulAdd(l22, by, high[1].v[j]);
     const V one = m[0].v[j], x = m[1].v[j], y = m[2].v[j], xx = m[3].v[j], xy = m[4].v[j], yy = m[5].v[j];

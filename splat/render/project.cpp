@@ -130,8 +130,9 @@ template <class V>
 InCameraGradient<V> project_adjoint(const Lens& lens, const InCamera<V>& g, const V* d_mean_px, const V* d_factor,
                                     const V& d_depth) {
   const V zero{};
-  InCameraGradient<V> d{};
+  InCameraGradient<V> d;
   d.p[2] = d_depth;
+  for (V& axis : d.axes[2]) axis = zero;
   const double lens_focal[2] = {lens.fx, lens.fy};
   for (int i = 0; i < 2; ++i) {
     const V h = g.ratio[i].value, focal = lens_focal[i] * g.inverse_z;
@@ -294,9 +295,12 @@ struct Project {
     const V d_depth = a.d_depths ? load_wide<kCount>(a.d_depths.row(n), 1, count) : zero;
     if (!any_lane(drawn | (d_depth != zero))) return;
     const InCamera<V> g = taken<V>(lens, a.means.row(n), a.axes.row(n), count);
-    V d_mean_px[2] = {}, d_factor[6] = {};
-    for (Index i = 0; i < 2 && a.d_means_px; ++i) d_mean_px[i] = load_wide<kCount>(a.d_means_px.row(n) + i, 2, count);
-    for (Index i = 0; i < 6 && a.d_factors; ++i) d_factor[i] = load_wide<kCount>(a.d_factors.row(n) + i, 6, count);
+    // Arrays are not cleared as wholes: GCC 12 does that by a slow instruction.
+    V d_mean_px[2], d_factor[6];
+    for (Index i = 0; i < 2; ++i)
+      d_mean_px[i] = a.d_means_px ? load_wide<kCount>(a.d_means_px.row(n) + i, 2, count) : zero;
+    for (Index i = 0; i < 6; ++i)
+      d_factor[i] = a.d_factors ? load_wide<kCount>(a.d_factors.row(n) + i, 6, count) : zero;
     InCameraGradient<V> d = project_adjoint(lens, g, d_mean_px, d_factor, d_depth);
     const LaneMask<V> with_depth = has_depth<S>(g.p);
     for (int i = 0; i < 3; ++i) {

@@ -36,8 +36,9 @@ struct RowNumbers {
 /// kCount of them. Pairs past the end of their tile have no sums (row B12: crowded pixel). False if there are none.
 template <Index kCount, Index kParts, class S>
 bool sum_slots(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
-               double* totals) {
-  DoubleLanes<kCount> sums[kParts] = {};
+               DoubleLanes<kCount>* totals) {
+  DoubleLanes<kCount> sums[kParts];
+  for (auto& sum : sums) sum = DoubleLanes<kCount>{};  // one by one: GCC 12 clears arrays by a slow instruction
   bool any = false;
   for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
     const DepthKeyed& end = from.ends[static_cast<std::size_t>(from.lists.tile_of(slot))];
@@ -47,14 +48,14 @@ bool sum_slots(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t ke
     for (Index part = 0; part < kParts; ++part)
       sums[part] = sums[part] + load_wide<kCount>(of_slot + part * kCount, 1, kCount);
   }
-  std::memcpy(totals, sums, sizeof sums);
+  for (Index part = 0; part < kParts; ++part) totals[part] = sums[part];
   return any;
 }
 
 /// The same of as many parts as the slots have from there on, kMostParts at most.
 template <Index kCount, Index kMostParts, class S>
 bool sum_slots_of(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
-                  double* totals) {
+                  DoubleLanes<kCount>* totals) {
   if constexpr (kMostParts > 1) {
     if (from.stride - first <= (kMostParts - 1) * kCount)
       return sum_slots_of<kCount, kMostParts - 1>(from, slots, key, n, first, totals);
@@ -88,7 +89,8 @@ void add_gradients(const SlotSums<S>& from, const SplatArrays<S>& set, const Ren
   using V = DoubleLanes<kCount>;
   LaneMask<V> rows{};
   for (Index first = 0; first < numbers; first += kSlotNumbers) {
-    double totals[kCount][kSlotNumbers];
+    V totals[kCount][kSlotNumbers / kCount];
+    const auto total = [&](Index i, Index k) { return totals[i][k / kCount][k % kCount]; };
     for (Index i = 0; i < count; ++i) {
       const std::uint64_t key = depth_key(set, settings, row.in_set + i);
       const TileLists::Slots slots = from.lists.slots[row.in_lists + i];
@@ -99,14 +101,16 @@ void add_gradients(const SlotSums<S>& from, const SplatArrays<S>& set, const Ren
     if (first == 0 && from.first_feature > 0 && d.of_shape()) {
       static_assert(kMoments <= kSlotNumbers);
       V moments[kMoments];
-      for (Index k = 0; k < kMoments; ++k) moments[k] = load_lanes<kCount>(&totals[0][k], kSlotNumbers, count);
+      for (Index k = 0; k < kMoments; ++k) {
+        for (Index i = 0; i < kCount; ++i) moments[k][i] = total(std::min(i, count - 1), k);
+      }
       const V d_opacity = record_moments(from.of_blocks, records, count, moments);
       add_record_gradients(set, settings, row.in_set, count, records, rows, d_opacity, moments, d);
     }
     for (Index i = 0; i < count; ++i) {
       if (!rows[i]) continue;
       for (Index j = std::max(first, from.first_feature); j < std::min(first + kSlotNumbers, numbers); ++j) {
-        d.features.row(row.in_set + i)[j - from.first_feature] += static_cast<S>(totals[i][j - first]);
+        d.features.row(row.in_set + i)[j - from.first_feature] += static_cast<S>(total(i, j - first));
       }
     }
   }

@@ -23,6 +23,21 @@ struct SplatArrays {
   Index rows() const { return means.shape.rows; }
 };
 
+/// The first features of a Gaussian, where a cache line has room for them beside the rest: colours.
+template <class S>
+struct RecordFeatures {
+  static constexpr Index kCount = 0;
+  void set(const S*, Index) {}
+};
+template <>
+struct RecordFeatures<float> {
+  static constexpr Index kCount = 3;
+  float numbers[kCount];
+  void set(const float* features, Index count) {
+    for (Index k = 0; k < kCount; ++k) numbers[k] = k < count ? features[k] : 0.0f;
+  }
+};
+
 template <class S>
 struct alignas(64) SplatRecord {  // a cache line
   double x, y;      ///< mean, pixels; the loops use its place in the tile, which S holds to far more digits
@@ -30,7 +45,9 @@ struct alignas(64) SplatRecord {  // a cache line
   S opacity;        ///< with the antialias factor
   S log2_opacity;   ///< of an opacity held at or above kLeastOpacity
   std::int32_t row_begin, row_end;  ///< pixels
+  [[no_unique_address]] RecordFeatures<S> features = {};
 };
+static_assert(sizeof(SplatRecord<float>) == 64 && sizeof(SplatRecord<double>) == 64);
 
 /// Settings as the pixel loops use them.
 template <class S>
@@ -54,11 +71,6 @@ CompositeRules<S> composite_rules(const RenderSettings& settings) {
           settings.stop_rule == StopRule::kExclusive,
           settings.cap_gradient == CapGradient::kPass,
           static_cast<S>(settings.blur)};
-}
-
-template <class S>
-bool all_finite(const S* x, Index n) {
-  return std::all_of(x, x + n, [](S v) { return std::isfinite(v); });
 }
 
 /// Camera z of row n in double, metres.
@@ -123,28 +135,57 @@ void outlines_of(const SplatArrays<S>& splats, const RenderSettings& settings, c
   o.reach = reach_of(o.conic, o.x, o.log2_opacity, rules);
 }
 
-/// Record and extent of row n, which is lane i of the outlines; an empty extent if it is not drawn.
-template <class V, class S>
-void finish_record(const SplatArrays<S>& splats, const TileGrid& grid, const ExtentRules& rules, Index n,
-                   const SplatOutlines<V>& o, Index i, SplatRecord<S>& record, Extent& extent) {
-  extent = {};
-  if (!o.drawn[i] || !all_finite(splats.features.row(n), splats.features.shape.cols)) return;
+/// Not drawn are rows of which a feature is not finite. 0 times that is NaN: no branch.
+template <class S>
+bool has_finite_features(const ConstArray<S>& features, Index n) {
+  S none = 0;
+  for (Index k = 0; k < features.shape.cols; ++k) none += features.row(n)[k] * S(0);
+  return none == S(0);
+}
+
+/// The extent of lane i of outlines; see extent_of.
+template <class V>
+Extent extent_at(const SplatOutlines<V>& o, Index i, const TileGrid& grid, const ExtentRules& rules) {
   const ConicOf<V>& c = o.conic;
-  const ReachOf<V>& r = o.reach;
   const Conic conic = {c.l11[i],        c.l21[i], c.l22[i], c.xx[i], c.xy[i], c.yy[i], c.sharp_determinant[i],
                        c.determinant[i]};
-  const ReachOf<double> reach = {r.half_width[i],       r.half_height[i], r.right_dy[i], r.slope[i],
-                                 r.inner_half_width[i], r.squared[i],     r.flatness[i], r.room[i]};
-  extent = extent_of(conic, o.x[i], o.y[i], o.opacity[i], reach, grid, rules);
-  record = {o.x[i],
-            o.y[i],
-            static_cast<S>(conic.l11),
-            static_cast<S>(conic.l21),
-            static_cast<S>(conic.l22),
-            static_cast<S>(o.opacity[i]),
-            static_cast<S>(o.log2_opacity[i]),
-            extent.row_begin,
-            extent.row_end};
+  return extent_of(conic, o.x[i], o.y[i], o.opacity[i], {}, grid, rules);
+}
+
+/// Records and extents of rows [n, n + count) from their outlines; an empty extent of one that is not drawn.
+template <class V, class S>
+void finish_records(const SplatArrays<S>& splats, const TileGrid& grid, const ExtentRules& rules, Index n, Index count,
+                    const SplatOutlines<V>& o, SplatRecord<S>* records, Extent* extents) {
+  using Rounded = Lanes<S, kLanesOf<V>>;
+  if (!any_lane(o.drawn)) {  // the other numbers may not be set
+    std::fill_n(extents, count, Extent{});
+    return;
+  }
+  const bool of_ellipse = is_of_ellipse(rules);
+  const LaneMask<V> reaches = may_be_drawn(o.opacity, rules);
+  const Rounded l11 = convert_lanes<Rounded>(o.conic.l11), l21 = convert_lanes<Rounded>(o.conic.l21);
+  const Rounded l22 = convert_lanes<Rounded>(o.conic.l22);
+  const Rounded opacity = convert_lanes<Rounded>(o.opacity), log2_opacity = convert_lanes<Rounded>(o.log2_opacity);
+  ExtentOf<V> ellipses;
+  if (of_ellipse) ellipses = extent_within(o.reach, o.x, o.y, grid);
+  for (Index i = 0; i < count; ++i) {
+    extents[i] = {};
+    if (!o.drawn[i] || !has_finite_features(splats.features, n + i)) continue;
+    if (!of_ellipse) extents[i] = extent_at(o, i, grid, rules);
+    if (of_ellipse && reaches[i]) extents[i] = extent_at(ellipses, i);
+    // Number by number: of a record that is put together first, GCC reads wholes where it has just written parts.
+    SplatRecord<S>& r = records[i];
+    r.x = o.x[i];
+    r.y = o.y[i];
+    r.l11 = l11[i];
+    r.l21 = l21[i];
+    r.l22 = l22[i];
+    r.opacity = opacity[i];
+    r.log2_opacity = log2_opacity[i];
+    r.row_begin = extents[i].row_begin;
+    r.row_end = extents[i].row_end;
+    r.features.set(splats.features.row(n + i), splats.features.shape.cols);
+  }
 }
 
 /// Records and extents of rows [begin, end); the extents of those that are not drawn are empty, kCount at a
@@ -159,9 +200,7 @@ void make_records(const SplatArrays<S>& splats, const RenderSettings& settings, 
   for (; begin < end; begin += kCount, records += kCount, extents += kCount) {
     const Index count = std::min(kCount, end - begin);
     outlines_of(splats, settings, rules, begin, count, outlines);
-    for (Index i = 0; i < count; ++i) {
-      finish_record(splats, grid, rules, begin + i, outlines, i, records[i], extents[i]);
-    }
+    finish_records(splats, grid, rules, begin, count, outlines, records, extents);
   }
 }
 

@@ -10,9 +10,11 @@
 #include <cstring>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "core/buffer.h"
+#include "core/lanes.h"
 #include "core/parallel.h"
 #include "core/types.h"
 #include "splat/render/conic.h"
@@ -77,12 +79,43 @@ inline Extent rectangle_extent(Pixels rows, Pixels cols) {
 /// Those of INRIA's square of three standard deviations.
 Extent square_extent(const Conic& conic, double x, double y, const TileGrid& grid);
 
+/// Numbers of 32 bits beside T, which is double or Lanes of them.
+template <class T>
+struct Beside {
+  static constexpr Index kCount = kLanesOf<T>;
+  using Whole = Lanes<std::int32_t, kCount>;
+  using Float = Lanes<float, kCount>;
+  static Whole whole(const T& x) { return convert_lanes<Whole>(x); }
+  static T wide(const Whole& x) { return convert_lanes<T>(x); }
+  static Float rounded(const T& x) { return convert_lanes<Float>(x); }
+  static Whole mask(const LaneMask<T>& m) { return convert_lanes<Whole>(m); }
+};
+template <>
+struct Beside<double> {
+  static constexpr Index kCount = 1;
+  using Whole = std::int32_t;
+  using Float = float;
+  static std::int32_t whole(double x) { return static_cast<std::int32_t>(x); }
+  static double wide(std::int32_t x) { return x; }
+  static float rounded(double x) { return static_cast<float>(x); }
+  static std::int32_t mask(bool m) { return m ? -1 : 0; }
+};
+
+/// Ranges of pixels beside T.
+template <class T>
+struct PixelsOf {
+  typename Beside<T>::Whole begin, end;
+};
+
 /// Pixels whose centres lie in [low, high], held in [0, size]; none for NaN.
-inline Pixels pixels_within(double low, double high, Index size) {
-  const double end = static_cast<double>(size), first = low - 0.5, last = high - 0.5;
-  const double from = first < end ? std::ceil(first > 0 ? first : 0.0) : end;
-  const double to = last >= 0 ? (last < end ? std::floor(last) + 1 : end) : 0.0;
-  return {static_cast<Index>(from), static_cast<Index>(to)};
+template <class T>
+PixelsOf<T> pixels_within(const T& low, const T& high, Index size) {
+  using Of = Beside<T>;
+  const T zero{}, after = zero + static_cast<double>(size), first = low - 0.5, last = high - 0.5;
+  const T from = first < after ? (first > zero ? first : zero) : after;
+  const T to = last >= zero ? (last < after ? last : after - 1.0) : zero - 1.0;
+  const typename Of::Whole begin = Of::whole(from);  // rounded down: a mask is −1
+  return {begin - Of::mask(Of::wide(begin) < from), Of::whole(to) + 1};
 }
 
 /// What an ellipse of pixels where α may reach alpha_min is made of. T: double, or Lanes of them.
@@ -115,26 +148,78 @@ ReachOf<T> reach_of(const ConicOf<T>& conic, const T& x, const T& log2_opacity, 
           1e-4 + kRoom * (lane_abs(x) + reach * width)};
 }
 
-/// The extent of an ellipse around (x, y).
-inline Extent extent_within(const ReachOf<double>& reach, double x, double y, const TileGrid& grid) {
-  if (!(x + reach.half_width >= 0.5 && x - reach.half_width <= static_cast<double>(grid.width) - 0.5)) return {};
-  Extent result = rectangle_extent(pixels_within(y - reach.half_height, y + reach.half_height, grid.height),
-                                   pixels_within(x - reach.half_width, x + reach.half_width, grid.width));
+/// Extents, number by number; see Extent.
+template <class T>
+struct ExtentOf {
+  typename Beside<T>::Whole is_ellipse;  ///< a mask
+  PixelsOf<T> rows, cols;
+  typename Beside<T>::Float first_dy, lowest_dy, highest_dy, right_dy, x, slope, half_width, reach_squared, flatness,
+      room;
+};
+
+/// The extents of ellipses around (x, y).
+template <class T>
+ExtentOf<T> extent_within(const ReachOf<T>& reach, const T& x, const T& y, const TileGrid& grid) {
+  using Of = Beside<T>;
   constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
-  if (!(std::abs(x) < kFar && std::abs(y) < kFar && reach.half_width < kFar && reach.half_height < kFar)) return result;
+  ExtentOf<T> e;
+  e.rows = pixels_within(T(y - reach.half_height), T(y + reach.half_height), grid.height);
+  e.cols = pixels_within(T(x - reach.half_width), T(x + reach.half_width), grid.width);
+  e.is_ellipse =
+      Of::mask((lane_abs(x) < kFar) & (lane_abs(y) < kFar) & (reach.half_width < kFar) & (reach.half_height < kFar));
+  const T first_row = Of::wide(e.rows.begin & -static_cast<std::int32_t>(grid.tile));
+  e.first_dy = Of::rounded(first_row + 0.5 - y);
+  e.lowest_dy = Of::rounded(lane_max(T(Of::wide(e.rows.begin) + 0.5 - y), T(-reach.half_height)));
+  e.highest_dy = Of::rounded(-lane_max(T(y - (Of::wide(e.rows.end) - 0.5)), T(-reach.half_height)));
+  e.right_dy = Of::rounded(reach.right_dy);
+  e.x = Of::rounded(x - 0.5);
+  e.slope = Of::rounded(reach.slope);
+  e.half_width = Of::rounded(reach.inner_half_width);
+  e.reach_squared = Of::rounded(reach.squared);
+  e.flatness = Of::rounded(reach.flatness);
+  e.room = Of::rounded(reach.room);
+  return e;
+}
+
+/// Number i of T, which is the only one of a double.
+template <class T>
+auto lane(const T& x, [[maybe_unused]] Index i) {
+  if constexpr (std::is_arithmetic_v<T>) {
+    return x;
+  } else {
+    return x[i];
+  }
+}
+
+/// Extent i.
+template <class T>
+Extent extent_at(const ExtentOf<T>& e, Index i) {
+  Extent result =
+      rectangle_extent({lane(e.rows.begin, i), lane(e.rows.end, i)}, {lane(e.cols.begin, i), lane(e.cols.end, i)});
+  if (result.row_begin >= result.row_end || lane(e.is_ellipse, i) == 0) return result;
   result.kind = Extent::Kind::kEllipse;
-  const std::int32_t first_row = result.row_begin & -static_cast<std::int32_t>(grid.tile);
-  result.first_dy = static_cast<float>(first_row + 0.5 - y);
-  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -reach.half_height));
-  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, reach.half_height));
-  result.right_dy = static_cast<float>(reach.right_dy);
-  result.x = static_cast<float>(x - 0.5);
-  result.slope = static_cast<float>(reach.slope);
-  result.half_width = static_cast<float>(reach.inner_half_width);
-  result.reach_squared = static_cast<float>(reach.squared);
-  result.flatness = static_cast<float>(reach.flatness);
-  result.room = static_cast<float>(reach.room);
+  result.first_dy = lane(e.first_dy, i);
+  result.lowest_dy = lane(e.lowest_dy, i);
+  result.highest_dy = lane(e.highest_dy, i);
+  result.right_dy = lane(e.right_dy, i);
+  result.x = lane(e.x, i);
+  result.slope = lane(e.slope, i);
+  result.half_width = lane(e.half_width, i);
+  result.reach_squared = lane(e.reach_squared, i);
+  result.flatness = lane(e.flatness, i);
+  result.room = lane(e.room, i);
   return result;
+}
+
+/// Whether an extent is that of an ellipse where α may reach alpha_min.
+inline bool is_of_ellipse(const ExtentRules& rules) {
+  return rules.footprint != Footprint::kSquare3Sigma && rules.alpha_min > 0;
+}
+
+/// False: α is below alpha_min everywhere.
+template <class T>
+LaneMask<T> may_be_drawn(const T& opacity, const ExtentRules& rules) {
+  return opacity >= rules.alpha_min * (1 - 4 * rules.epsilon);
 }
 
 /// The extent that rules ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
@@ -145,9 +230,9 @@ inline Extent extent_within(const ReachOf<double>& reach, double x, double y, co
 inline Extent extent_of(const Conic& conic, double x, double y, double opacity, const ReachOf<double>& reach,
                         const TileGrid& grid, const ExtentRules& rules) {
   if (rules.footprint == Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
-  if (rules.alpha_min <= 0) return rectangle_extent({0, grid.height}, {0, grid.width});
-  if (!(opacity >= rules.alpha_min * (1 - 4 * rules.epsilon))) return {};
-  return extent_within(reach, x, y, grid);
+  if (!is_of_ellipse(rules)) return rectangle_extent({0, grid.height}, {0, grid.width});
+  if (!may_be_drawn(opacity, rules)) return {};
+  return extent_at(extent_within(reach, x, y, grid), 0);
 }
 
 /// Tiles of the box around an extent.

@@ -108,4 +108,16 @@ TEST_CASE("beyond where a lens turns back nothing is seen") {
   CHECK_THROWS_AS(straightened(Image(1, 3, 3), wide, folding), InternalError);
 }
 
+TEST_CASE("a lens that turns back within the picture covers no picture of that size") {
+  Camera camera{200, 100, 100, 100, 100, 50, {}};  // edges at 1 and 0.5
+  CHECK(covers_picture({}, camera));
+  CHECK(covers_picture({.k1 = 9}, camera));
+  // It turns back at 1/sqrt(-3 k1), which it shows at two thirds of that.
+  CHECK(covers_picture({.k1 = -0.148}, camera));
+  CHECK_FALSE(covers_picture({.k1 = -0.149}, camera));
+  camera.cx = 105;
+  CHECK_FALSE(covers_picture({.k1 = -0.148}, camera));
+  CHECK(covers_picture({.k1 = -0.3, .k2 = 0.09}, camera));  // grows again
+}
+
 }  // namespace lens_test

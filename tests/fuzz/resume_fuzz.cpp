@@ -27,7 +27,7 @@ bool accepts(std::span<const uint8_t> file) {
   is_read([&] { look_at_run_folder(scratch().path(), kConfig, false); });
   const bool is_taken = is_read([&] {
     RunFolder folder(scratch().path(), {.config = kConfig}, true);
-    folder.truncate_metrics_after(1);
+    folder.keep_metrics([](const std::string&, std::optional<int> frame) { return frame && *frame <= 1; });
   });
   if (!file.empty()) scratch().try_file(Scratch::with_choice(2, {}));  // the run has written its status
   return is_taken;

@@ -60,6 +60,7 @@ struct Scene {
         const S feature = named < 0 ? static_cast<S>(random.uniform(0, 1)) : S(i == named + k ? 1 : 0);
         features[static_cast<std::size_t>(i * kChannels + k)] = feature;
       }
+      records.back().features.set(features.data() + i * kChannels, kChannels);
     }
   }
 };

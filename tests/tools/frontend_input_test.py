@@ -205,9 +205,10 @@ def check_what_is_written(frontend, here, packages, env):
 # hsi4d: notes how it was called, and says of the camera what the file `word` has.
 STAND_IN = """#!/bin/bash
 cd "$(dirname "$0")" || exit
+[[ $* == *--help ]] && { echo --check; exit 0; }
 echo "$*" >>calls.txt
+[[ $* == *--check ]] && { [[ ! -e refused ]] || { cat refused >&2; exit 2; }; exit 0; }
 case $1 in
-  info) [[ ! -e refused ]] || { cat refused >&2; exit 2; } ;;
   locate) echo "  PSNR of the compared pixels: 9.0 dB before, 9.1 dB ($(cat word))"; while [[ $1 != --out ]]; do shift; done; touch "$2" ;;
   init) while [[ $1 != --out ]]; do shift; done; mkdir "$2" ;;
 esac
@@ -318,10 +319,13 @@ with tempfile.TemporaryDirectory() as name:
     (here / "z/found/masks").mkdir(parents=True)
     (here / "z/found_of.txt").write_text(f"video {hashed(video)}\n")
 
-    # The video is looked at first, in the words of the options.
+    # Video and options are looked at first.
     (program.parent / "refused").write_text("hsi4d: error: gives 1 of its 1 frames\n")
     assert "gives 1 of its 1 frames" in run(*all_of_it, env=environment)
-    assert calls.read_text() == f"info {video} --frame-rate 5\n", calls.read_text()
+    found = here / "z/found"
+    looked = (f"init {video} --keypoints {found}/keypoints.json --masks {found}/masks --frame-rate 5 "
+              f"--scene {video} --out {here}/z/clip --check")
+    assert calls.read_text() == looked + "\n", calls.read_text()
     (program.parent / "refused").unlink()
 
     # A camera of which the program says fail ends the work, each time; one option goes on.
@@ -329,13 +333,13 @@ with tempfile.TemporaryDirectory() as name:
     for _ in range(2):
         said = run(*all_of_it, env=environment)
         assert "the camera is not found: hsi4d locate says fail" in said and "--any-camera" in said, said
-    assert [line.split()[0] for line in calls.read_text().splitlines()] == ["info", "info", "locate", "info"]
+    assert [line.split()[0] for line in calls.read_text().splitlines()] == ["init", "init", "locate", "init"]
     assert not (here / "z/clip").exists()
     result = subprocess.run([str(text) for text in [*all_of_it, "--any-camera"]], capture_output=True, text=True, env=environment)
     assert result.returncode == 0, result.stdout + result.stderr
     done = calls.read_text().splitlines()[4:]
-    assert [line.split()[0] for line in done] == ["info", "init", "run"], done
-    assert f"--camera {here}/z/camera.json --scene {video}" in done[1] and "--frame-rate 5" in done[1], done
+    assert [line.split()[0] for line in done] == ["init", "init", "run"], done
+    assert f"--camera {here}/z/camera.json --scene {video}" in done[1] and "--check" in done[0] and "--frame-rate 5" in done[1], done
     # Only then do other options need another folder; their order says nothing.
     said = run(*all_of_it, "--frame-rate", "4", env=environment)
     assert "clip was made of" in said and "< --frame-rate 5" not in said and "> --frame-rate 4" in said, said

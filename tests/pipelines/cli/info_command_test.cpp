@@ -13,6 +13,7 @@
 #include "core/image_io.h"
 #include "core/npz.h"
 #include "core/text.h"
+#include "core/video.h"
 #include "splat/files/io_ply.h"
 #include "splat/files/splat_file.h"
 #include "tests/support/program.h"
@@ -90,10 +91,11 @@ TEST_CASE("info tells what is in a file") {
   write_layers("i.exr", {{"R", "Z"}, Image(2, 3, 5), ""});
   CHECK(cli::info_command("i.exr") == "i.exr: 5 x 3 pixels, layers R Z\n");
 
-  CHECK_THROWS_MATCHES(cli::info_command("a.plly"), UserError,
-                       Message("hsi4d info: a.plly: nothing is known of files that end in \".plly\"; allowed: " +
-                               joined(splat_endings()) +
-                               ", .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg, .exr; did you mean \".ply\"?"));
+  CHECK_THROWS_MATCHES(
+      cli::info_command("a.plly"), UserError,
+      Message("hsi4d info: a.plly: nothing is known of files that end in \".plly\"; allowed: " +
+              joined(splat_endings()) + ", .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg, .exr and videos: " +
+              video_endings() + "; did you mean \".ply\"?"));
   const ProgramResult missing = run_hsi4d({"info", "missing.ply"});
   CHECK(missing.status == 2);
   CHECK(missing.out.empty());

@@ -237,6 +237,27 @@ TEST_CASE("hsi4d init takes a person whose feet are out of the picture in some f
                                 "frame 1"));
 }
 
+TEST_CASE("hsi4d init --check looks at what is there before keypoints and masks are") {
+  const Footage footage;
+  const auto check = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"init",  footage.frames, "--keypoints", "later.json", "--masks",
+                                      "later", "--out",        "clip",        "--check"};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult run = run_hsi4d(words);
+    CHECK_FALSE(fs::exists("clip"));
+    return std::to_string(run.status) + " " + run.out + run.err;
+  };
+  CHECK_THAT(check({}), Contains("0 " + footage.frames + ": 4 frames of "));
+  CHECK_THAT(check({"--longest-side-px", "1"}), Contains("2 ") && Contains("--longest-side-px: 1 is out of range"));
+  CHECK_THAT(check({"--lens-k1", "-9"}), Contains("2 ") && Contains("--lens-k1 is -9"));
+  CHECK_THAT(check({"--avatar", "none.safetensors"}), Contains("2 ") && Contains("none.safetensors"));
+  CHECK_THAT(check({"--scene", "none.ply"}), Contains("2 ") && Contains("none.ply"));
+  const std::string scene = (TinyDataset::folder() / "scene.ply").string();
+  CHECK_THAT(check({"--scene", scene}), Contains("0 " + footage.frames));  // its camera is found later
+  CHECK_THAT(check({"--scene", scene, "--focal-px", "500"}), Contains("2 ") && Contains("leave out --focal-px"));
+  CHECK_THAT(check({"--frame-rate", "1000"}), Contains("2 ") && Contains("frame"));
+}
+
 TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {
   const Footage footage;
   const auto error = [&](std::vector<std::string> more) {
@@ -249,6 +270,8 @@ TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {
   CHECK_THAT(error({"--focal-px", "-3"}), Contains("hsi4d init: --focal-px: -3 is out of range; allowed: 1 to "));
   CHECK_THAT(error({"--camera-height", "0"}), Contains("--camera-height: 0 is out of range"));
   CHECK_THAT(error({"--lens-k1", "11"}), Contains("--lens-k1: 11 is out of range; allowed: -10 to 10"));
+  CHECK_THAT(error({"--lens-k1", "-9"}), Contains("hsi4d init: --lens-k1 is -9: such a lens turns back before an "
+                                                  "edge of the picture"));
   CHECK_THAT(error({"--longest-side-px", "8"}), Contains("--longest-side-px: 8 is out of range; allowed: 64 to 4096"));
   CHECK_THAT(error({"--frame-rate", "-1"}), Contains("--frame-rate: -1"));
   const std::string camera = (TinyDataset::folder() / "camera.json").string();

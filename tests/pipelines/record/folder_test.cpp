@@ -202,6 +202,15 @@ TEST_CASE("a config with its stages in another order is another one") {
   CHECK(opening_message("a", now, true) == "opened");
 }
 
+namespace {
+
+/// Keeps the lines of frames up to one.
+void keep_up_to(RunFolder& folder, int last) {
+  folder.keep_metrics([last](const std::string&, std::optional<int> frame) { return frame && *frame <= last; });
+}
+
+}  // namespace
+
 TEST_CASE("after truncation the metrics are as if the run had never gone further") {
   const TemporaryFolder here;
   leave_run("whole", RunState::kDone);
@@ -214,7 +223,7 @@ TEST_CASE("after truncation the metrics are as if the run had never gone further
       RunFolder folder("a", identity(), true);
       const auto lines = std::count(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut), '\n');
       const int checkpoint = static_cast<int>(lines / 2) < 3 ? static_cast<int>(lines / 2) : 1;
-      folder.truncate_metrics_after(checkpoint);
+      keep_up_to(folder, checkpoint);
       for (int frame = checkpoint + 1; frame <= 3; ++frame)
         for (int i = 0; i < 2; ++i) folder.append_metrics(record(frame, i));
     }
@@ -222,8 +231,19 @@ TEST_CASE("after truncation the metrics are as if the run had never gone further
     fs::remove_all("a");
   }
   RunFolder folder("whole", identity(), true);
-  folder.truncate_metrics_after(0);
+  keep_up_to(folder, 0);
   CHECK(file_text("whole/metrics.jsonl").empty());
+}
+
+TEST_CASE("lines of metrics are kept by their stage and frame") {
+  const TemporaryFolder here;
+  RunFolder folder("a", identity(), false);
+  here.write("a/metrics.jsonl",
+             "{\"frame\": 1, \"stage\": \"a\"}\n{\"stage\": \"all\"}\n{\"frame\": 1, \"stage\": \"b\"}\n"
+             "{\"frame\": 2, \"stage\": \"b\"}\n");
+  folder.keep_metrics(
+      [](const std::string& stage, std::optional<int> frame) { return !frame || (stage == "b" && *frame == 1); });
+  CHECK(file_text("a/metrics.jsonl") == "{\"stage\": \"all\"}\n{\"frame\": 1, \"stage\": \"b\"}\n");
 }
 
 TEST_CASE("a line of metrics that is none of ours is told with its number") {
@@ -232,10 +252,10 @@ TEST_CASE("a line of metrics that is none of ours is told with its number") {
   folder.append_metrics(record(1, 0));
   const std::string good = file_text("a/metrics.jsonl");
   here.write("a/metrics.jsonl", good + "{\"frame\": 1,, }\n" + good);
-  CHECK_THROWS_WITH(folder.truncate_metrics_after(1), Catch::Matchers::StartsWith("a/metrics.jsonl:2:"));
+  CHECK_THROWS_WITH(keep_up_to(folder, 1), Catch::Matchers::StartsWith("a/metrics.jsonl:2:"));
   here.write("a/metrics.jsonl", good + good + "{\"iteration\": 1}\n");
   CHECK_THROWS_MATCHES(
-      folder.truncate_metrics_after(1), DataError,
+      keep_up_to(folder, 1), DataError,
       Message("a/metrics.jsonl:3:1: there is no \"stage\"") || Message("a/metrics.jsonl:3: there is no \"stage\""));
 }
 

@@ -1,5 +1,6 @@
 #include "pipelines/run/checkpoint.h"
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -160,6 +161,62 @@ TEST_CASE("progress survives its checkpoint bit for bit") {
       CHECK(read.covered(0, y, x) == saved.covered(0, y, x));
     }
   }
+}
+
+TEST_CASE("what came after the first pass survives its checkpoint bit for bit") {
+  using Scope = StageScope;
+  constexpr std::array<Scope, 4> kOver = {Scope::kSequence, Scope::kFrame, Scope::kFrame, Scope::kSequence};
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  RunProgress saved = random_progress(clip);
+  RandomSequence random(7);
+  for (const std::size_t frames : {3, 2, 2}) {
+    LaterStage& stage = saved.later.emplace_back();
+    for (std::size_t t = 0; t < frames; ++t) stage.states.push_back(random_state(random));
+    stage.totals = {static_cast<Index>(random.below(100)), 1, 0.1, 9, 2065, 67984};
+  }
+  saved.bias = DepthBias{1.003, {0.999, 1}};
+  saved.left_out = {{4, 1, 1, "center", "it is hidden"}};
+  save_progress(kFile, kConfig, saved);
+  const RunProgress read = load_progress(kFile, kConfig, clip, kStages, {}, 0, kOver);
+  REQUIRE(read.later.size() == 3);
+  for (std::size_t s = 0; s < 3; ++s) {
+    REQUIRE(read.later[s].states.size() == saved.later[s].states.size());
+    for (std::size_t t = 0; t < read.later[s].states.size(); ++t)
+      CHECK(same_bits(read.later[s].states[t], saved.later[s].states[t]));
+    CHECK(read.later[s].totals.iterations == saved.later[s].totals.iterations);
+  }
+  REQUIRE(read.bias.has_value());
+  CHECK(read.bias->human == 1.003);
+  CHECK(read.bias->objects == std::vector<double>{0.999, 1});
+  CHECK(read.left_out.size() == 1);
+}
+
+TEST_CASE("frames that stages after the first pass cannot have done are refused") {
+  using Scope = StageScope;
+  constexpr std::array<Scope, 4> kOver = {Scope::kSequence, Scope::kFrame, Scope::kFrame, Scope::kSequence};
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  const auto error_of = [&](const std::vector<std::size_t>& frames) {
+    RunProgress progress = random_progress(clip);
+    for (const std::size_t count : frames) progress.later.push_back({std::vector(count, clip.first), {}});
+    save_progress(kFile, kConfig, progress);
+    try {
+      load_progress(kFile, kConfig, clip, kStages, {}, 0, kOver);
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  using Frames = std::vector<std::size_t>;
+  for (const Frames& frames : {Frames{}, Frames{3}, Frames{3, 1, 1}, Frames{3, 2, 2}, Frames{3, 3, 3, 3}})
+    CHECK(error_of(frames) == "no error");
+  for (const Frames& frames : {Frames{2}, Frames{4}, Frames{3, 2}, Frames{3, 3}, Frames{3, 2, 1}, Frames{3, 0, 0},
+                               Frames{3, 3, 2}, Frames{3, 2, 2, 3}, Frames{3, 3, 3, 3, 3}})
+    CHECK(error_of(frames) ==
+          kFile +
+              ": \"later/frames\" holds numbers of frames that the 4 stages after the first pass cannot have done in "
+              "a clip of 3");
 }
 
 TEST_CASE("a checkpoint names its instruction set, and one of a version that did not is read") {

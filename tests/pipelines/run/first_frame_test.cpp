@@ -255,12 +255,13 @@ TEST_CASE("scopes of stages have an order, and frames need stages of their own",
   CHECK(problems_of({Scope::kFirst, Scope::kFirst, Scope::kFrame, Scope::kFrame, Scope::kSequence}).empty());
   CHECK(problems_of({Scope::kFrame, Scope::kFirst}) ==
         "/stages/b/over: a stage over the first frame cannot come after \"a\", which is over frames\n");
-  CHECK(problems_of({Scope::kFrame, Scope::kSequence, Scope::kFrame}) ==
-        "/stages/c/over: a stage over frames cannot come after \"b\", which is over the sequence\n");
+  CHECK(problems_of({Scope::kFirst, Scope::kFrame, Scope::kSequence, Scope::kFrame, Scope::kFrame}).empty());
   CHECK(problems_of({Scope::kFrame, Scope::kSequence, Scope::kFirst}) ==
         "/stages/c/over: a stage over the first frame cannot come after \"b\", which is over the sequence\n");
   CHECK(problems_of({Scope::kSequence}) ==
         "/stages/a/over: a stage over the sequence needs one over frames before it\n");
+  CHECK(problems_of({Scope::kFirst, Scope::kSequence, Scope::kFrame}) ==
+        "/stages/b/over: a stage over the sequence needs one over frames before it\n");
   CHECK(problems_of({Scope::kFirst}) ==
         "/stages/a/over: a stage over the first frame needs one over frames after it\n");
   CHECK(problems_of({Scope::kFirst, Scope::kSequence}) ==

@@ -202,8 +202,8 @@ TEST_CASE("a pixel that a footprint only just reaches is in the lists [B7]") {
       for_each_tile(extents[n], grid, visit);
       const double reach = e.squared_reach(settings);
       const double high = std::sqrt(reach * e.yy) + 2, wide = std::sqrt(reach * e.xx) + 2;
-      const Pixels rows = pixels_within(e.y - high, e.y + high, grid.height);
-      const Pixels cols = pixels_within(e.x - wide, e.x + wide, grid.width);
+      const auto rows = pixels_within(e.y - high, e.y + high, grid.height);
+      const auto cols = pixels_within(e.x - wide, e.x + wide, grid.width);
       for (Index row = rows.begin; row < rows.end; ++row) {
         for (Index col = cols.begin; col < cols.end; ++col) {
           if (e.squared_distance(row, col) > reach) continue;
