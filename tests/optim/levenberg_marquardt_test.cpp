@@ -156,21 +156,6 @@ TEST_CASE("a singular matrix, and numbers that nothing depends on, do not distur
   CHECK(found[2] == 0);
 }
 
-TEST_CASE("a matrix that is not finite is replaced by the lengths of the gradients") {
-  // ∂² loss = 2e320, which no double holds, of a loss and a gradient that are finite.
-  constexpr double kSlope = 1e160, kGoal = 1e-160;
-  Tape<double> tape;
-  const Var<double> x = tape.parameter("x", kScalarShape), slope = tape.constant("slope", kScalarShape);
-  tape.write(x).data[0] = 0;
-  tape.write(slope).data[0] = kSlope;
-  const Var<double> loss = sum(square(matmul(x - kGoal, slope)));
-  LevenbergMarquardt<double> method(tape, loss, {{{"x", {x}}, moving(kGoal / 20)}}, damped(1e-9));
-  CHECK(value(tape, loss) == Approx(1));
-  step(tape, loss, method, 0, 10);
-  CHECK(tape.value(x).scalar() == Approx(kGoal / 2).epsilon(1e-6));  // kLongestMatrixStep times the learning rate
-  CHECK(value(tape, loss) == Approx(0.25).epsilon(1e-5));
-}
-
 TEST_CASE("a loss without a curvature is followed by its gradient") {
   Tape<double> tape;
   const Var<double> x = tape.parameter("x", kScalarShape), y = tape.parameter("y", kScalarShape);
