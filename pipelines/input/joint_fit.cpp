@@ -120,8 +120,8 @@ void begin_hinge(std::span<const Rigid<double>> poses, ObjectJoint& joint) {
         Vector3<double>(pose.translation - turn * joint.rest.translation));
   }
   if (most < kLeastTurn)
-    throw UserError("the object turns by " + rounded(most / kDegree, 3) + " degrees at most; an axis shows from " +
-                    rounded(kLeastTurn / kDegree, 1) + " on");
+    throw UserError("the object turns by less than " + rounded(kLeastTurn / kDegree, 1) +
+                    " degrees, which tells no axis");
 }
 
 void begin_slide(std::span<const Rigid<double>> poses, ObjectJoint& joint) {
@@ -133,8 +133,7 @@ void begin_slide(std::span<const Rigid<double>> poses, ObjectJoint& joint) {
     most = std::max(most, way.norm());
   }
   if (most < kLeastWay)
-    throw UserError("the object moves by " + rounded(1000 * most, 3) + " mm at most; an axis shows from " +
-                    rounded(1000 * kLeastWay, 2) + " on");
+    throw UserError("the object moves by less than " + rounded(1000 * kLeastWay, 2) + " mm, which tells no axis");
   joint.axis = Eigen::SelfAdjointEigenSolver<Matrix3<double>>(scatter).eigenvectors().col(2);
 }
 

@@ -158,7 +158,7 @@ KeyedMotion open_motion() {
     return holding(seconds, pelvis, pelvis_turn, spine, head, hinge, {0, 0, opened_deg - 20}, 64, left);
   };
   KeyedMotion motion;
-  motion.ground = {{0.25, 0.85}, -40};
+  motion.ground = {{0.25, 0.85}, -100};
   motion.feet = {planted_foot(0.12, 0.1, 10), planted_foot(-0.13, -0.1, -14)};
   motion.keys = {
       at(0, {0, -0.02, -0.02}, {2, -4, 0}, {4, -4, 0}, {14, 4, 0}, 0, {{0, 0.02, 0}, {0, 0, 0}, 24}),

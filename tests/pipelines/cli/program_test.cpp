@@ -183,7 +183,7 @@ TEST_CASE("list tells losses and settings") {
   const std::string stages = cli::list_command("stages", test_losses());
   CHECK_THAT(stages, Contains("\nframe        scene  camera           Six numbers of the camera") &&
                          Contains("\nframe        all    body_pose        21 joints of the body\n"));
-  CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 2 * (1 + 13) + 1 + 5 + 3);
+  CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 2 * (1 + 14) + 1 + 5 + 3);
   CHECK_THAT(cli::list_command("scenes", test_losses()),
              Contains("\nscene      garden         a lawn with a path") &&
                  Contains("\nmotion     push           walks in a circle, pushing it") &&

@@ -96,7 +96,7 @@ TEST_CASE("the gradients of a joint, and of its parent's pose through it, are ri
 TEST_CASE("an object on a joint is drawn where the joint has it, and read back on it") {
   for (const JointType type : {JointType::kHinge, JointType::kSlide}) {
     for (const bool has_parent : {false, true}) {
-      Clip clip = clip_with_joint(type, has_parent);
+      const Clip clip = clip_with_joint(type, has_parent);
       const ObjectJoint joint = *clip.objects[1].joint;
       Tape<double> tape;
       FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings_of());
@@ -116,9 +116,10 @@ TEST_CASE("an object on a joint is drawn where the joint has it, and read back o
       // The same picture as that of a free object there.
       tape.forward(graph.rendered().image);
       const double on_joint_sum = tape.value(graph.rendered().image)(0, 9, 11);
-      clip.objects[1].joint.reset();
+      Clip free_clip = clip;
+      free_clip.objects[1].joint.reset();
       Tape<double> free_tape;
-      FrameGraph<double> free(free_tape, clip, clip.first.camera_from_world, settings_of());
+      FrameGraph<double> free(free_tape, free_clip, free_clip.first.camera_from_world, settings_of());
       free.set_state(state);
       free_tape.forward(free.rendered().image);
       CHECK(on_joint_sum == Approx(free_tape.value(free.rendered().image)(0, 9, 11)).epsilon(1e-12));

@@ -87,8 +87,8 @@ TEST_CASE("what is wrong with a contact is named with its place, its value and w
   CHECK(fault_of(R"({"frame": 1, "body": "head", "object": "can", "weight": 0})") ==
         at + "/weight: 0 is out of range; allowed: above 0, up to 1e6");
   CHECK(
-      fault_of(R"({"frame": 1, "body": "head", "object": "can", "wait": 1})") ==
-      at + "/wait: is not known; allowed: frame, body, vertex, object, point, scene, weight; did you mean \"weight\"?");
+      fault_of(R"({"frame": 1, "body": "head", "object": "can", "weigth": 1})") ==
+      at + "/weigth: is not known; allowed: frame, body, vertex, object, point, scene, weight; did you mean \"weight\"?");
   CHECK(fault_in(R"({"format": "hsi4d contacts", "version": 2, "contacts": []})") ==
         "c.json:1: /version: 2 is not known; allowed: 1");
   CHECK(fault_in(R"({"format": "contacts", "version": 1, "contacts": []})") ==
@@ -101,7 +101,7 @@ TEST_CASE("what is wrong with a contact is named with its place, its value and w
 TEST_CASE("a contact of nothing that the body has is refused before a run") {
   const BodyModel body = procedural_body();
   const std::vector<AnnotatedContact> known = read(
-      R"({"frame": 1, "body": "left_eye_smplhf", "scene": [0, 0, 0]}, {"frame": 1, "vertex": 18711, "scene": [0, 0, 0]})");
+      R"({"frame": 1, "body": "left_wrist", "scene": [0, 0, 0]}, {"frame": 1, "vertex": 18711, "scene": [0, 0, 0]})");
   CHECK_NOTHROW(check_contacts(known, &body, {}, "c.json"));
   CHECK_THROWS_WITH(check_contacts(read(R"({"frame": 1, "vertex": 18712, "scene": [0, 0, 0]})"), &body, {}, "c.json"),
                     "c.json: /contacts/0/vertex: 18712 is out of range; allowed: 0 to 18711");
