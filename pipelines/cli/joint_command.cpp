@@ -65,7 +65,9 @@ std::string joint_command(const JointArguments& a) {
   const auto [low, high] = std::minmax_element(found.values.begin(), found.values.end());
   double squares = 0;
   for (const double distance : found.distances) squares += distance * distance;
-  const auto shown = [is_hinge](double q) { return rounded(is_hinge ? q / kDegree : 1000 * q, 4); };
+  const auto shown = [is_hinge](double q) {
+    return number_text(std::round(10 * (is_hinge ? q / kDegree : 1000 * q)) / 10 + 0.0);  // no -0
+  };
   return to_json_line(joint_section(a, found.joint)) + "\n" + a.object + (is_hinge ? " turns" : " slides") + " from " +
          shown(*low) + " to " + shown(*high) + (is_hinge ? " degrees" : " mm") + "; its points are " +
          rounded(1000 * std::sqrt(squares / static_cast<double>(found.distances.size())), 3) +

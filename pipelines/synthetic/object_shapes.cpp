@@ -159,8 +159,8 @@ void add_gate(SurfaceModel& model) {
       return Rgb(color * (1 + grain));
     };
     model.add_box(
-        Point(0, y, 0.01 + high / 2), Point(kThick, 0.44 * wide, high / 2), 0, [&](int) { return boards; }, 1.2, 0,
-        true);
+        Point(0, y, 0.01 + high / 2), Point(kThick, 0.44 * wide, high / 2), 0, [&](int) { return boards; },
+        1.15 + 0.04 * i, 0, true);
   }
   for (const double side : {-1.0, 1.0}) {  // rails, and a brace between them
     const double x = side * 1.9 * kThick;

@@ -86,9 +86,9 @@ TEST_CASE("what is wrong with a contact is named with its place, its value and w
         at + "/point: is of an object; \"scene\" is a point");
   CHECK(fault_of(R"({"frame": 1, "body": "head", "object": "can", "weight": 0})") ==
         at + "/weight: 0 is out of range; allowed: above 0, up to 1e6");
-  CHECK(
-      fault_of(R"({"frame": 1, "body": "head", "object": "can", "weigth": 1})") ==
-      at + "/weigth: is not known; allowed: frame, body, vertex, object, point, scene, weight; did you mean \"weight\"?");
+  CHECK(fault_of(R"({"frame": 1, "body": "head", "object": "can", "weigth": 1})") ==
+        at + "/weigth: is not known; allowed: frame, body, vertex, object, point, scene, weight; did you mean "
+             "\"weight\"?");
   CHECK(fault_in(R"({"format": "hsi4d contacts", "version": 2, "contacts": []})") ==
         "c.json:1: /version: 2 is not known; allowed: 1");
   CHECK(fault_in(R"({"format": "contacts", "version": 1, "contacts": []})") ==

@@ -28,7 +28,7 @@ RunConfig config_of(const CopiedDataset& dataset) {
     auto& stage = c["stages"]["interaction"];
     stage["iterations"] = 40;
     stage["losses"] = {{"annotated_contact", {{"weight", 1}}}};
-    stage["optimize"] = {{"transl", {{"lr", 0.01}, {"lr_final_share", 0.05}}}};
+    stage["optimize"] = {{"transl", {{"lr", 0.05}, {"lr_final_share", 0.02}}}};
     c["stages"]["all"] = {{"over", "sequence"},
                           {"iterations", 3},
                           {"losses", {{"annotated_contact", {{"weight", 1}}}, {"fit", {{"weight", 1}}}}},
@@ -62,7 +62,7 @@ TEST_CASE("contacts of some frames pull in these alone, in stages over frames an
   CHECK(by_frame[1] == std::pair(0.0, 0.0));
   CHECK(by_frame[2].second < 0.95 * by_frame[2].first);  // two places that one hand cannot both be at
   CHECK(by_frame[3].first > 0.01);
-  CHECK(by_frame[3].second < 1e-4);
+  CHECK(by_frame[3].second < 0.01 * by_frame[3].first);
   const double after = (by_frame[2].second + by_frame[3].second) / 3;  // the mean over frames 1 to 3
   CHECK(over_all <= 1.05 * after);
   CHECK(over_all > 0.3 * after);  // points nearer by now may stand for those of before

@@ -29,12 +29,13 @@ struct GateClip {
     settings.object = SyntheticObjectKind::kGate;
     settings.object_gaussians = 600;
     settings.frame_rate = 2;
-    settings.size_px = 64;
+    settings.size_px = 96;
     ConfigProblems problems;
     const ConfigValue stages = load_config_text(kTinyStages, "tiny.json", folder.path(), {}, problems);
     problems.throw_if_any();
     write_dataset(settings, video_render_settings(), path, {}, stages);
     write_changed(path / "config.json", path / "joint.json", [](auto& c) {
+      c["stages"]["camera"]["iterations"] = 40;
       auto& stage = c["stages"]["interaction"];
       stage["iterations"] = 60;
       stage["losses"] = {{"photometric", {{"ssim_share", 0.1}}}, {"mask", {{"human", false}}}};
