@@ -102,11 +102,31 @@ TEST_CASE("the sweeps of AnyInteraction have the clips that the paper scores: al
   }
   CHECK(statics.size() == 11);
   CHECK(dynamics.size() == 9);
-  CHECK(clips_of("anyinteraction_static.json") == statics);
-  CHECK(clips_of("anyinteraction_dynamic.json") == dynamics);
+  for (const char* of : {"anyinteraction_", "anyinteraction_best_"}) {
+    INFO(of);
+    CHECK(clips_of(std::string(of) + "static.json") == statics);
+    CHECK(clips_of(std::string(of) + "dynamic.json") == dynamics);
+  }
   std::map<std::string, std::set<std::string>> both = statics;
   both.merge(dynamics);
   CHECK(clips_of("ablations.json") == both);
+}
+
+TEST_CASE("the sweeps of AnyInteraction by best.json have its method without its refinement, and the paper's clips") {
+  nlohmann::json method = method_of(resolved_file(shipped("best.json")));
+  REQUIRE(method["stages"].erase("refinement") == 1);
+  for (const char* kind : {"static.json", "dynamic.json"}) {
+    INFO(kind);
+    const SweepPlan& paper = plan_of(shipped(std::string("sweeps/anyinteraction_") + kind));
+    const SweepPlan& best = plan_of(shipped(std::string("sweeps/anyinteraction_best_") + kind));
+    REQUIRE(best.runs.size() == paper.runs.size());
+    for (std::size_t i = 0; i < best.runs.size(); ++i) {
+      INFO(i);
+      CHECK(best.runs[i].dataset == paper.runs[i].dataset);  // the same video of the same seed
+      CHECK_FALSE(best.runs[i].dataset.empty());
+      CHECK(nlohmann::json::diff(method, method_of(best.runs[i].config)).dump() == "[]");
+    }
+  }
 }
 
 TEST_CASE("the sweep of the ablations and the configs of them leave out the same", "[release]") {
