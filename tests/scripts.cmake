@@ -56,13 +56,15 @@ if(HSI4D_PYTHON3)
   set_tests_properties("runs in MLflow's files" PROPERTIES LABELS quick)
   add_test(NAME "services for video, masks and poses"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
+  add_test(NAME "masks by SAM 2"
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools sam2)
   add_test(NAME "the gate of time and error"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/bench_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "what the front end says of wrong input"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_input_test.py ${PROJECT_SOURCE_DIR}/tools)
   set_tests_properties("what the front end says of wrong input" PROPERTIES LABELS quick)
   set_tests_properties("exporters of VPoser, WHAM, GVHMR, TRAM and WHAC" "services for video, masks and poses" "embeddings by CLIP"
-                       "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+                       "masks by SAM 2" "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
   add_test(NAME "links between pages"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/links_test.py ${PROJECT_SOURCE_DIR})
   set_tests_properties("links between pages" PROPERTIES LABELS quick)

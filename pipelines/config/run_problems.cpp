@@ -422,6 +422,16 @@ void add_joint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   }
 }
 
+/// Stages over the sequence that no prior holds. Shipped configs are meant so: that is no reason to warn.
+void add_prior_notes(const RunConfig& config, std::vector<RunNote>& notes) {
+  for (const auto& [name, stage] : config.stages) {
+    const ParameterGroupSettings* const latents = find_entry(stage.optimize, kPoseLatents);
+    if (latents == nullptr || latents->lr == 0 || !stage.pose_weights.empty()) continue;
+    notes.push_back({LogLevel::kInfo, "stages." + name + ": without pose_weights its " + kPoseLatents +
+                                          " stand for poses one to one, and no prior holds the body"});
+  }
+}
+
 /// Losses without their files, and files without a loss that reads them.
 void add_file_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   if (!config.chain.empty()) return;
@@ -601,6 +611,7 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   add_object_notes(config, notes);
   add_keypoint_notes(config, notes);
   add_joint_notes(config, notes);
+  add_prior_notes(config, notes);
   add_file_notes(config, notes);
   add_hint_notes(config, notes);
   if (config.log.images_every > 0 && !config.log.tensorboard)

@@ -42,8 +42,9 @@ struct RunNote {
 /// Whether a loss is on and means nothing where there are no objects.
 bool is_of_objects(const LossSettings& loss);
 
-/// Losses of objects where there are none, approximations that are on, settings of `skip` and `approx` that switch
-/// others off or do nothing, and of optimisers that are of another kind than the stage's.
+/// Losses of objects where there are none, stages over the sequence without a prior, approximations that are on,
+/// settings of `skip` and `approx` that switch others off or do nothing, and of optimisers that are of another kind
+/// than the stage's.
 std::vector<RunNote> run_notes(const RunConfig& config);
 
 /// Prepares the losses of a run. Throws one UserError with every problem of it, a line each.

@@ -18,6 +18,7 @@ namespace made_chain_test {
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
+using Catch::Matchers::Message;
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
@@ -62,6 +63,19 @@ struct Workshop {
     }
   }
   static RunConfig config() { return changed_config(make_all); }
+  /// A program estimates poses too, and the camera of a clip is chosen. Where a file of the name "hang-poses" is, the
+  /// program hangs for the clip that it names.
+  static RunConfig estimating(std::size_t chosen) {
+    script("poses",
+           "echo \"$1\" >> poses.txt; if [ \"$(cat hang-poses 2> /dev/null)\" = \"$1\" ]; then sleep 60; fi\n" +
+               std::string("cp ") + (TinyChain::folder() / "clips").string() + "/$1/truth/motion.npz \"$2\"");
+    return changed_config([chosen](Json& c) {
+      make_all(c);
+      c["chain"][chosen]["select_camera"] = true;
+      c["camera_selection"]["radii_m"] = {2};
+      c["sources"]["motion"]["command"] = {"./poses", "{prompt}", "{out}"};
+    });
+  }
   /// Programs that film the first frame standing still.
   static RunConfig standing_still() {
     script("film", "mkdir \"$3\"; for i in 0000 0001 0002; do cp \"$1\" \"$3/$i.png\"; done");
@@ -198,13 +212,7 @@ TEST_CASE("a later clip is filmed from the state in which the one before ended, 
 
 TEST_CASE("the first clip's camera can be chosen too, and programs estimate the motion of each clip", "[run][chain]") {
   const Workshop workshop;
-  script("poses", "cp " + (TinyChain::folder() / "clips").string() + "/$1/truth/motion.npz \"$2\"");
-  const RunConfig config = changed_config([](Json& c) {
-    make_all(c);
-    c["chain"][0]["select_camera"] = true;
-    c["camera_selection"]["radii_m"] = {2};
-    c["sources"]["motion"]["command"] = {"./poses", "{prompt}", "{out}"};
-  });
+  const RunConfig config = Workshop::estimating(0);
   execute_tiny_chain(config, "run");
   CHECK(fs::exists("run/starts/clip1.camera.json"));
   CHECK_FALSE(fs::exists("run/starts/clip2.camera.json"));
@@ -212,6 +220,39 @@ TEST_CASE("the first clip's camera can be chosen too, and programs estimate the 
   int motions = 0;
   for (const auto& file : fs::directory_iterator("generated")) motions += file.path().extension() == ".npz" ? 1 : 0;
   CHECK(motions == 2);
+}
+
+TEST_CASE("a chain goes on after a stop while a camera is chosen, and after one in the estimator", "[run][chain]") {
+  const Workshop workshop;
+  const RunConfig config = Workshop::estimating(1);
+  execute_tiny_chain(config, "run");
+  fs::rename("run", "whole");
+  fs::rename("generated", "generated-whole");
+  for (const char* notes : {"film.txt", "mask.txt", "poses.txt"}) fs::remove(notes);
+
+  CHECK_THROWS_MATCHES(execute_tiny_chain(config, "run", 1, false, [] { return fs::exists("run/starts/clip2.json"); }),
+                       Interrupted,
+                       Message("clip 2 of 2, clip2: interrupted while cameras were tried; nothing is written"));
+  CHECK(json_of("run/status.json")["state"] == "interrupted");
+  CHECK_FALSE(fs::exists("run/starts/clip2.camera.json"));
+  CHECK(finished_clips(config, "run", loss_terms()) == 1);
+  CHECK(text_of("film.txt") == "clip1\n");
+
+  std::ofstream("hang-poses") << "clip2";
+  CHECK_THROWS_MATCHES(
+      execute_tiny_chain(config, "run", 1, true, [] { return text_of("poses.txt") == "clip1\nclip2\n"; }), Interrupted,
+      Message("clip 2 of 2, clip2: interrupted while ./poses made the motion; nothing is left of it"));
+  CHECK(json_of("run/status.json")["state"] == "interrupted");
+  CHECK(fs::exists("run/starts/clip2.camera.json"));
+  CHECK_FALSE(fs::exists("run/clips/clip2"));
+  CHECK(finished_clips(config, "run", loss_terms()) == 1);
+
+  fs::remove("hang-poses");
+  execute_tiny_chain(config, "run", 1, true);
+  check_same_chains("run", "whole");
+  CHECK(text_of("film.txt") == "clip1\nclip2\n");  // what was there is not made again
+  CHECK(text_of("mask.txt") == "clip1\nclip2\n");
+  CHECK(text_of("poses.txt") == "clip1\nclip2\nclip2\n");
 }
 
 TEST_CASE("an input that a clip of a chain names is not made", "[run][chain]") {

@@ -1,20 +1,25 @@
 // The numbers that the paper's supplementary text gives (C.2 to C.6, D.1), as the shipped configs resolve to them, and
 // the choices that it leaves open (docs/numerics/measurements.md).
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/check.h"
 #include "core/file.h"
 #include "optim/loss_term.h"
 #include "optim/losses/list.h"
 #include "optim/metrics.h"
 #include "pipelines/config/run_config.h"
+#include "tests/support/temporary_folder.h"
 
 namespace paper_numbers_test {
 
 using namespace hsi4d;
+using Catch::Matchers::Message;
+using hsi4d::test::TemporaryFolder;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
@@ -116,11 +121,13 @@ TEST_CASE("the paper's numbers are those of its configs") {
   CHECK(kMetricJoints == 22);  // C.3
 }
 
-TEST_CASE("every third frame of a video of 153 is kept, 51 in all") {
+// Which frames those are: tests/pipelines/input/frame_source_test.cpp.
+TEST_CASE("a video of 153 frames at 30 a second becomes a clip of 51 at 10") {
   const Json config = resolved("sources/kling.json");
   CHECK(config["sources"]["video"]["frames"] == 153);
-  CHECK(config["data"]["video_rate"].get<double>() / config["data"]["frame_rate"].get<double>() == 3);
-  CHECK(153 / 3 == resolved("anyinteraction/base.json")["synthetic"]["frames"].get<int>());
+  CHECK(config["data"]["video_rate"] == 30);
+  CHECK(config["data"]["frame_rate"] == 10);
+  CHECK(resolved("anyinteraction/base.json")["synthetic"]["frames"] == 51);
 }
 
 TEST_CASE("the paper's evaluation is 11 static and 9 dynamic instances of five seeds, without refinement") {
@@ -132,6 +139,41 @@ TEST_CASE("the paper's evaluation is 11 static and 9 dynamic instances of five s
     const Json sweep = Json::parse(read_text_file(shipped(std::string("sweeps/") + name + ".json").string()));
     CHECK(sweep["clips"].size() == static_cast<std::size_t>(instances));
     CHECK(sweep["seeds"] == 5);
+  }
+}
+
+TEST_CASE("the paper's evaluation is paper.json without its refinement") {
+  Json evaluated = resolved("anyinteraction/base.json"), paper = resolved("paper.json");
+  CHECK(evaluated["stages"].size() == 2);
+  CHECK(paper["stages"].erase("refinement") == 1);
+  for (Json* const config : {&evaluated, &paper}) {
+    for (const char* of_clips : {"name", "synthetic"}) config->erase(of_clips);
+  }
+  CHECK(evaluated["camera"] == paper["camera"]);
+  CHECK(Json::diff(paper, evaluated).dump() == "[]");
+}
+
+TEST_CASE("a word that is none of a choice's is refused with its place and all that are") {
+  struct Choice {
+    const char* pointer;
+    const char* words;
+  };
+  const TemporaryFolder here;
+  for (const Choice& choice : {Choice{"/camera/increment", R"("camera", "world", "scene")"},
+                               {"/stages/interaction/losses/center/unit", R"("pixels", "widths", "ndc")"},
+                               {"/stages/interaction/losses/center/norm", R"("squared", "l1")"},
+                               {"/stages/interaction/losses/center/moves", R"("all", "object")"},
+                               {"/stages/refinement/losses/contact/points", R"("vertices", "gaussians")"},
+                               {"/stages/refinement/losses/fit/joints", R"("sum", "mean")"},
+                               {"/stages/refinement/losses/smooth/frames", R"("mean", "sum")"}}) {
+    const std::string pointer = choice.pointer;
+    nlohmann::ordered_json config = {{"extends", shipped("paper.json").string()}};
+    config[nlohmann::ordered_json::json_pointer(pointer)] = "nowhere";
+    here.write("a.json", config.dump(1));  // "extends" in line 2, then a line a key
+    const auto line = 2 + std::count(pointer.begin(), pointer.end(), '/');
+    CHECK_THROWS_MATCHES(load_run_config("a.json", {}, descriptions_of(loss_terms())), UserError,
+                         Message("a.json:" + std::to_string(line) + ": " + pointer +
+                                 ": \"nowhere\" is not one of the choices; allowed: " + choice.words));
   }
 }
 

@@ -94,6 +94,29 @@ TEST_CASE("a sequence graph has the joints of its states, frame by frame") {
   }
 }
 
+TEST_CASE("fit sees 22 joints of each frame, in paper.json as the mean over their coordinates") {
+  const Clip clip = small_clip(16, 14, 100);
+  const std::vector<SceneState> states = some_states(clip);
+  Tape<double> tape;
+  const SequenceGraph<double> graph(tape, clip, states, nullptr, RotationParameters::kAxisAngle);
+  const auto transl = std::find_if(graph.groups().begin(), graph.groups().end(),
+                                   [](const ParameterGroup<double>& group) { return group.name == kTranslGroup; });
+  REQUIRE(transl != graph.groups().end());
+  const Array<double> numbers = tape.write(transl->blocks.front());
+  for (Index i = 0; i < numbers.shape.count(); ++i) numbers.data[i] += 0.01;  // along all three axes
+  const RunConfig paper = load_run_config(HSI4D_SOURCE_DIR "/configs/paper.json", {}, descriptions_of(loss_terms()));
+  const StageSettings* const refinement = find_entry(paper.stages, "refinement");
+  REQUIRE(refinement != nullptr);
+  const LossSettings* const of_paper = find_entry(refinement->losses, "fit");
+  REQUIRE(of_paper != nullptr);
+  const Var<double> sum = term_named("fit").record(graph.loss_inputs(), own_settings("fit", R"({"joints": "sum"})")),
+                    mean = term_named("fit").record(graph.loss_inputs(), of_paper->own);
+  tape.forward(sum);
+  CHECK(tape.value(sum).scalar() == Approx(22 * 3 * 0.01 * 0.01).epsilon(1e-9));
+  tape.forward(mean);
+  CHECK(tape.value(mean).scalar() == Approx(0.01 * 0.01).epsilon(1e-9));
+}
+
 TEST_CASE("points of body and objects of a sequence are where the states have them") {
   Clip clip = small_clip(16, 14, 100);
   const BodySet of = GENERATE(BodySet::kGaussians, BodySet::kVertices);

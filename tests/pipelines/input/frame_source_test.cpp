@@ -79,6 +79,21 @@ TEST_CASE("frames are the nearest to the rate that is kept, or all") {
   CHECK(FrameSource("a", {12, 12}).count() == 13);
 }
 
+TEST_CASE("of a video of 153 frames the paper's setting keeps 51: 0, 3, ..., 150") {
+  const RunConfig config =
+      load_run_config(fs::path(HSI4D_SOURCE_DIR) / "configs/sources/kling.json", {}, descriptions_of(loss_terms()));
+  const TemporaryFolder here;
+  write_numbered_folder("a", static_cast<int>(config.sources.video.frames));
+  const FrameSource frames("a", {config.data.video_rate, config.data.frame_rate});
+  CHECK(frames.video_count() == 153);
+  REQUIRE(frames.count() == 51);
+  for (Index t = 0; t < 51; ++t) {
+    CHECK(frames.number(t) == 3 * t);
+    CHECK(frames.names()[static_cast<std::size_t>(t)] == four_digits(static_cast<int>(3 * t)) + ".png");
+  }
+  CHECK(frames.names().back() == "0150.png");
+}
+
 TEST_CASE("rates that cannot be kept are told") {
   const TemporaryFolder here;
   write_numbered_folder("a", 5);

@@ -10,6 +10,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/image_io.h"
+#include "pipelines/config/run_problems.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/graph/frame_graph.h"
 #include "pipelines/input/state.h"
@@ -263,6 +264,37 @@ TEST_CASE("a stage over the sequence that leaves the body where it was is told",
   execute_tiny(refined_config(), "moved");
   CHECK_THAT(file_text("still/log.txt"), Contains("stage refinement: the joints have moved by 0.00"));
   CHECK_THAT(file_text("moved/log.txt"), !Contains("the joints have moved by"));
+}
+
+TEST_CASE("a stage over the sequence that no prior holds is noted once, and not warned of", "[run][sequence]") {
+  const auto notes = [](const RunConfig& config) {
+    std::string text;
+    for (const RunNote& note : run_notes(config))
+      text += std::string(log_level_name(note.level)) + " " + note.text + "\n";
+    return text;
+  };
+  const std::string told =
+      "info stages.refinement: without pose_weights its pose_latents stand for poses one to one, and no prior holds "
+      "the body\n";
+  CHECK(notes(refined_config()) == told);
+  CHECK(notes(refined_config({"stages.refinement.optimize.pose_latents.lr=0"})).empty());
+  CHECK(notes(refined_config({"stages.refinement.optimize.pose_latents=null"})).empty());
+  CHECK(notes(refined_config(
+                  {std::string("stages.refinement.pose_weights=") + HSI4D_SOURCE_DIR + "/configs/pose_prior.npz"}))
+            .empty());
+  CHECK(notes(frames_alone(refined_config())).empty());
+  for (const char* shipped : {"best.json", "paper.json", "paper_static.json", "from_video.json"}) {
+    INFO(shipped);
+    const std::string of_shipped =
+        notes(load_run_config(fs::path(HSI4D_SOURCE_DIR) / "configs" / shipped, {}, descriptions_of(loss_terms())));
+    CHECK_THAT(of_shipped, Contains(told));
+  }
+  const TemporaryFolder here;
+  execute_tiny(refined_config(), "run");
+  const std::string log = file_text("run/log.txt");
+  const std::size_t first = log.find(told);
+  CHECK(first != std::string::npos);
+  CHECK(log.find("no prior holds", first + told.size()) == std::string::npos);
 }
 
 TEST_CASE("a run whose stage over the sequence has VPoser's weights moves in its latents", "[run][sequence]") {

@@ -1,5 +1,6 @@
 // The sweeps that come with the program.
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
@@ -62,6 +63,25 @@ std::map<std::string, nlohmann::json> ablations_of(const std::string& sweep) {
   return all;
 }
 
+/// Another reading of the paper: a row of the ablations, where its config differs from paper.json's, and how.
+struct Reading {
+  const char* name;
+  const char* pointer;
+  const char* word;  ///< or the end of a path
+};
+
+constexpr Reading kReadings[] = {
+    {"increment_camera", "/camera/increment", "camera"},
+    {"increment_world", "/camera/increment", "world"},
+    {"center_ndc", "/stages/interaction/losses/center/unit", "ndc"},
+    {"center_widths", "/stages/interaction/losses/center/unit", "widths"},
+    {"center_l1", "/stages/interaction/losses/center/norm", "l1"},
+    {"center_moves_all", "/stages/interaction/losses/center/moves", "all"},
+    {"fit_sum", "/stages/refinement/losses/fit/joints", "sum"},
+    {"smooth_mean", "/stages/refinement/losses/smooth/frames", "mean"},
+    {"prior", "/stages/refinement/pose_weights", "/configs/pose_prior.npz"},
+};
+
 }  // namespace
 
 TEST_CASE("every shipped sweep can be planned, and docs/sweeps.md tells its runs") {
@@ -102,11 +122,31 @@ TEST_CASE("the sweeps of AnyInteraction have the clips that the paper scores: al
   }
   CHECK(statics.size() == 11);
   CHECK(dynamics.size() == 9);
-  CHECK(clips_of("anyinteraction_static.json") == statics);
-  CHECK(clips_of("anyinteraction_dynamic.json") == dynamics);
+  for (const char* of : {"anyinteraction_", "anyinteraction_best_"}) {
+    INFO(of);
+    CHECK(clips_of(std::string(of) + "static.json") == statics);
+    CHECK(clips_of(std::string(of) + "dynamic.json") == dynamics);
+  }
   std::map<std::string, std::set<std::string>> both = statics;
   both.merge(dynamics);
   CHECK(clips_of("ablations.json") == both);
+}
+
+TEST_CASE("the sweeps of AnyInteraction by best.json have its method without its refinement, and the paper's clips") {
+  nlohmann::json method = method_of(resolved_file(shipped("best.json")));
+  REQUIRE(method["stages"].erase("refinement") == 1);
+  for (const char* kind : {"static.json", "dynamic.json"}) {
+    INFO(kind);
+    const SweepPlan& paper = plan_of(shipped(std::string("sweeps/anyinteraction_") + kind));
+    const SweepPlan& best = plan_of(shipped(std::string("sweeps/anyinteraction_best_") + kind));
+    REQUIRE(best.runs.size() == paper.runs.size());
+    for (std::size_t i = 0; i < best.runs.size(); ++i) {
+      INFO(i);
+      CHECK(best.runs[i].dataset == paper.runs[i].dataset);  // the same video of the same seed
+      CHECK_FALSE(best.runs[i].dataset.empty());
+      CHECK(nlohmann::json::diff(method, method_of(best.runs[i].config)).dump() == "[]");
+    }
+  }
 }
 
 TEST_CASE("the sweep of the ablations and the configs of them leave out the same", "[release]") {
@@ -124,11 +164,27 @@ TEST_CASE("the sweep of the ablations and the configs of them leave out the same
     CHECK(nlohmann::json::diff(in_sweep[in_block], method).dump() == "[]");
     CHECK(method != in_sweep[in_block == name ? "whole" : "paper, whole"]);
   }
-  CHECK(in_sweep.size() == configs + 2);  // and what they are compared with
+  CHECK(in_sweep.size() == configs + 2 + std::size(kReadings));  // and what they are compared with
   for (const auto& [name, method] : ablations_of("ablation_table.json")) {
     INFO(name);
     REQUIRE(in_sweep.contains(name));
     CHECK(nlohmann::json::diff(in_sweep[name], method).dump() == "[]");
+  }
+}
+
+TEST_CASE("the ablations of paper.json are its readings, each a word away", "[release]") {
+  std::map<std::string, nlohmann::json> in_sweep = ablations_of("ablations.json");
+  const nlohmann::json& paper = in_sweep["paper, whole"];
+  for (const Reading& reading : kReadings) {
+    INFO(reading.name);
+    REQUIRE(in_sweep.contains(std::string("paper, ") + reading.name));
+    const nlohmann::json changes = nlohmann::json::diff(paper, in_sweep[std::string("paper, ") + reading.name]);
+    REQUIRE(changes.size() == 1);
+    CHECK(changes[0]["op"] == "replace");
+    CHECK(changes[0]["path"] == reading.pointer);
+    const std::string value = changes[0]["value"];
+    CHECK(value.ends_with(reading.word));
+    CHECK((value == reading.word || fs::exists(value)));
   }
 }
 
