@@ -1,94 +1,57 @@
-// L = mean over the frames that move of L_t, L_t = mean over the contacts of frame t of w |b − x|², m²: parts of the
-// body are drawn to what somebody said that they touch in that frame. x is the place that is touched, and b the point
-// of the part that was nearest to it when the stage began; of a contact with an object without a place, b and the
-// object's Gaussian x are the nearest two. Where nothing is said of a frame L_t = 0. Points are vertices of the body,
-// or the avatar's Gaussians where it is made on another.   [beyond the paper, whose stage 3 finds contacts by itself:
-// contact.cpp]
+// L = mean over the frames that move of L_t, L_t = mean over the contacts of frame t of w min |b − x|², m²: parts of
+// the body are drawn to what somebody said that they touch in that frame. b are the points of the part, x the place
+// that is touched or, of a contact with an object without a place, the object's Gaussians; which two are nearest is
+// found anew in every evaluation, so that what touches somewhere has no pull. Where nothing is said of a frame L_t = 0.
+// Points are vertices of the body, or the avatar's Gaussians where it is made on another.   [beyond the paper, whose
+// stage 3 finds contacts by itself: contact.cpp]
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
+#include "autodiff/nearest.h"
 #include "autodiff/reduce.h"
 #include "core/check.h"
 #include "core/text.h"
 #include "optim/losses/list.h"
-#include "optim/object_centres.h"
 
 namespace hsi4d {
 
 namespace {
 
-constexpr double kAnywhere = 1e9;  // metres
+constexpr Index kMostBodyPoints = 512, kMostGaussians = 4096;  // of a contact: all pairs are tried
 
-/// What touches, what is touched, and their distance when the stage begins. Those on objects come first.
+/// What touches and what is touched. Targets are the points of objects, then the places.
 struct Touching {
   std::vector<BodyPoint> body;
   std::vector<ObjectPoint> objects;
-  std::vector<double> places;   // [.,3] of the scene, metres
+  std::vector<double> places;  // [.,3] of the scene, metres
+  std::vector<NearestSet> sets;
   std::vector<double> weights;  // of each squared distance in the loss
-  double distance = 0;          // metres, the sum
 };
 
-/// The point of the object that lies at a place in its frame.
-ObjectPoint point_of_object(const MotionStart& motion, const AnnotatedContact& contact) {
+/// At most so many of them, evenly.
+std::vector<Index> thinned(const std::vector<Index>& rows, Index most) {
+  const Index count = std::ssize(rows);
+  if (count <= most) return rows;
+  std::vector<Index> kept;
+  for (Index i = 0; i < most; ++i) kept.push_back(rows[static_cast<std::size_t>(i * count / most)]);
+  return kept;
+}
+
+void add_touched_points(const MotionStart& motion, const AnnotatedContact& contact, Touching& touching) {
   const std::vector<float>& means = motion.objects[static_cast<std::size_t>(*contact.object)]->means;
-  return {contact.frame, *contact.object, 0, *contact.place - Vector3<float>(means.data()).cast<double>()};
-}
-
-/// Where the object's nearest Gaussian is; without a place.
-struct NearestOfObject {
-  const MotionStart& motion;
-  Index frame, object;
-  ObjectCentres centres{{motion.objects[static_cast<std::size_t>(object)]}};
-
-  NearestGaussian operator()(const Vector3<double>& place) const {
-    const auto& poses = motion.world_from_object[static_cast<std::size_t>(frame)];
-    const auto found = centres.nearest(place, std::span(&poses[static_cast<std::size_t>(object)], 1), kAnywhere);
-    HSI4D_CHECK(found.has_value(), "an object without Gaussians, or without a place");
-    return *found;
+  if (contact.place) {
+    touching.objects.push_back(
+        {contact.frame, *contact.object, 0, *contact.place - Vector3<float>(means.data()).cast<double>()});
+    return;
   }
-};
-
-/// The first of the nearest points of the part.
-/// @param distance  of a point, metres
-template <class F>
-BodyPoint nearest_of(const MotionStart& motion, BodySet of, const AnnotatedContact& contact, const F& distance,
-                     double& least) {
-  BodyPoint nearest;
-  least = std::numeric_limits<double>::infinity();
-  for (const Index row : touching_rows(contact, *motion.rest_points(of).weights)) {
-    const BodyPoint point{contact.frame, row, of};
-    const double d = distance(motion.place(point));
-    if (d < least) {
-      least = d;
-      nearest = point;
-    }
-  }
-  HSI4D_CHECK(std::isfinite(least), "a contact of a part that has no point");
-  return nearest;
-}
-
-void add(const MotionStart& motion, BodySet of, const AnnotatedContact& contact, Touching& touching) {
-  double least = 0;
-  const auto to = [](const Vector3<double>& place) {
-    return [place](const Vector3<double>& point) { return (point - place).norm(); };
-  };
-  if (!contact.object) {
-    touching.body.push_back(nearest_of(motion, of, contact, to(*contact.place), least));
-    touching.places.insert(touching.places.end(), contact.place->data(), contact.place->data() + 3);
-  } else if (contact.place) {
-    const ObjectPoint touched = point_of_object(motion, contact);
-    touching.body.push_back(nearest_of(motion, of, contact, to(motion.place(touched)), least));
-    touching.objects.push_back(touched);
-  } else {
-    const NearestOfObject nearest{motion, contact.frame, *contact.object};
-    touching.body.push_back(nearest_of(
-        motion, of, contact, [&nearest](const Vector3<double>& point) { return nearest(point).distance; }, least));
-    touching.objects.push_back({contact.frame, *contact.object, nearest(motion.place(touching.body.back())).row});
-  }
-  touching.distance += least;
+  std::vector<Index> rows(means.size() / 3);
+  std::iota(rows.begin(), rows.end(), Index{0});
+  for (const Index row : thinned(rows, kMostGaussians))
+    touching.objects.push_back({contact.frame, *contact.object, row});
 }
 
 Touching touching_points(const MotionStart& motion) {
@@ -99,12 +62,40 @@ Touching touching_points(const MotionStart& motion) {
   for (const bool of_objects : {true, false}) {
     for (const AnnotatedContact& contact : *motion.contacts) {
       if (contact.object.has_value() != of_objects) continue;
-      add(motion, of, contact, touching);
+      NearestSet set{std::ssize(touching.body), 0, std::ssize(touching.objects) + std::ssize(touching.places) / 3, 1};
+      for (const Index row : thinned(touching_rows(contact, *motion.rest_points(of).weights), kMostBodyPoints))
+        touching.body.push_back({contact.frame, row, of});
+      set.points = std::ssize(touching.body) - set.first_point;
+      if (of_objects) {
+        add_touched_points(motion, contact, touching);
+        set.targets = std::ssize(touching.objects) - set.first_target;
+      } else {
+        touching.places.insert(touching.places.end(), contact.place->data(), contact.place->data() + 3);
+      }
+      touching.sets.push_back(set);
       touching.weights.push_back(contact.weight / (counts[static_cast<std::size_t>(contact.frame)] *
                                                    static_cast<double>(motion.moving_frames())));
     }
   }
   return touching;
+}
+
+/// How far the pairs are apart when the stage begins, on average, metres.
+double mean_distance(const MotionStart& motion, const Touching& touching) {
+  std::vector<Vector3<double>> targets;
+  for (const ObjectPoint& point : touching.objects) targets.push_back(motion.place(point));
+  for (std::size_t i = 0; i < touching.places.size(); i += 3) targets.emplace_back(&touching.places[i]);
+  double sum = 0;
+  for (const NearestSet& set : touching.sets) {
+    double least = std::numeric_limits<double>::infinity();
+    for (Index i = set.first_point; i < set.first_point + set.points; ++i) {
+      const Vector3<double> point = motion.place(touching.body[static_cast<std::size_t>(i)]);
+      for (Index j = set.first_target; j < set.first_target + set.targets; ++j)
+        least = std::min(least, (point - targets[static_cast<std::size_t>(j)]).norm());
+    }
+    sum += least;
+  }
+  return sum / static_cast<double>(touching.sets.size());
 }
 
 template <class S>
@@ -134,16 +125,17 @@ LossTerm annotated_contact_loss() {
             if (!in.gives(LossInput::kContacts)) return Value{};
             auto& tape = in.joints.owner();
             const Touching touching = touching_points(*in.motion);
-            const auto count = std::ssize(touching.body);
+            const auto count = std::ssize(touching.sets);
             if (count == 0) return sum(in.joints) * 0.0;  // depends on what the term does, and moves nothing
             if (in.notes != nullptr)
               in.notes->push_back(
                   {"annotated_contact", std::to_string(count) + (count == 1 ? " contact, " : " contacts, on average ") +
-                                            rounded(1000 * touching.distance / static_cast<double>(count), 3) +
-                                            " mm apart"});
-            const Value body = in.body_points(touching.body), touched = touched_places(in, tape, touching);
+                                            rounded(1000 * mean_distance(*in.motion, touching), 3) + " mm apart"});
+            const Value apart =
+                nearest_pairs(in.body_points(touching.body), touched_places(in, tape, touching), touching.sets);
             const Value weights = constant_of(tape, "contact_weights", touching.weights, 1);
-            return l2(body, touched, weights) * static_cast<double>(body.shape().count());
+            const Value nothing = constant_of(tape, "no_distance", {0}, 1);
+            return l2(apart, nothing, weights) * static_cast<double>(apart.shape().count());
           }));
 }
 

@@ -10,6 +10,7 @@
 #include "autodiff/map.h"
 #include "autodiff/matrix.h"
 #include "autodiff/mlp.h"
+#include "autodiff/nearest.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
 #include "autodiff/ssim.h"
@@ -70,6 +71,26 @@ Complexes product(const Complexes& a, const Complexes& b, std::size_t rows, std:
 Complexes picked(const Complexes& x, const std::vector<std::size_t>& places) {
   Complexes y;
   for (const std::size_t i : places) y.push_back(x[i]);
+  return y;
+}
+
+/// p − q of the rows whose real parts are nearest to each other.
+Complexes nearest_difference(const ComplexInputs& in, const std::vector<std::size_t>& points,
+                             const std::vector<std::size_t>& targets) {
+  double least = 1e9;
+  Complexes y;
+  for (const std::size_t i : points) {
+    for (const std::size_t j : targets) {
+      Complexes apart;
+      double squared = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        apart.push_back(in[0][3 * i + c] - in[1][3 * j + c]);
+        squared += std::real(apart[c]) * std::real(apart[c]);
+      }
+      if (squared < least) y = apart;
+      least = std::min(least, squared);
+    }
+  }
   return y;
 }
 
@@ -210,6 +231,17 @@ TEST_CASE("operators of arrays have the gradients of complex steps") {
       [](const ComplexInputs& in) {
         Complexes y = in[0];
         y.insert(y.end(), in[1].begin(), in[1].end());
+        return y;
+      });
+  check_complex_step(
+      {{"points", shape_of(4, 3)}, {"targets", shape_of(5, 3)}},
+      [](const Vars& in) {
+        return nearest_pairs(in[0], in[1], {{0, 3, 1, 4}, {3, 1, 0, 1}});
+      },
+      [](const ComplexInputs& in) {
+        Complexes y = nearest_difference(in, {0, 1, 2}, {1, 2, 3, 4});
+        const Complexes second = nearest_difference(in, {3}, {0});
+        y.insert(y.end(), second.begin(), second.end());
         return y;
       });
   const auto total = [](const Complexes& of) {

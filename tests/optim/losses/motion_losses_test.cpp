@@ -187,7 +187,7 @@ TEST_CASE("annotated_contact draws parts of the body to what they are said to to
   CHECK(loss == Approx(expected).epsilon(1e-12));
 }
 
-TEST_CASE("annotated_contact goes on with the points that were nearest, and is 0 where nothing is said") {
+TEST_CASE("annotated_contact looks for the nearest points anew, and is 0 where nothing is said") {
   MotionStart start = motion_of_test().start;
   start.contacts = {{.frame = kStill, .joints = {}, .vertex = 7, .place = Vector3<double>(0.1, 0.2, 0.3)}};
   const auto loss_of = [&start](const Vector3<double>& place, std::vector<LossNote>& notes) {

@@ -60,7 +60,7 @@ TEST_CASE("a hinge turns about its axis and a slide moves along it, from where t
   CHECK(std::isinf(some_joint(JointType::kSlide, random).high));
 }
 
-TEST_CASE("the value of a pose on the joint is the one that made it; of another the nearest rotation's or place's") {
+TEST_CASE("the value of a pose on the joint is the one that made it, and of another the nearest one") {
   RandomSequence random(2);
   for (int i = 0; i < 20; ++i) {
     for (const JointType type : {JointType::kHinge, JointType::kSlide}) {
