@@ -4,6 +4,7 @@
 #include "autodiff/frozen_linear.h"
 #include "autodiff/map.h"
 #include "autodiff/mlp.h"
+#include "autodiff/nearest.h"
 #include "autodiff/rotations.h"
 #include "autodiff/ssim.h"
 #include "autodiff/weighted_image.h"
@@ -121,6 +122,11 @@ struct Arrays {
         return x * exp(-y);
       });
     });
+    all.push_back(of_pairs<S>(false, [](V a, V b) {
+      std::vector<NearestSet> sets;
+      for (Index i = 0; i < kRows; ++i) sets.push_back({i, 1, i, 1});
+      return nearest_pairs(a, b, sets);
+    }));
     all.push_back(to_scalar(of_images<S>(1, 24, 16, [](V a, V b) { return l1(a, b); })));
     all.push_back(to_scalar(of_images<S>(1, 24, 16, [](V a, V b) { return l2(a, b); })));
     all.push_back(of_images<S>(1, 24, 16, [](V a, V b) { return weighted_image(a, b); }));

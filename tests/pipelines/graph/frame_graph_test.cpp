@@ -137,6 +137,8 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
   for (const ParameterGroup<double>& group : graph.groups()) {
     INFO("group " << group.name);
     CHECK(std::find(names.begin(), names.end(), group.name) != names.end());
+    CHECK(group.blocks.empty() == (group.name == kObjectJointGroup));  // the clip's objects are free: frame_joint_test
+    if (group.blocks.empty()) continue;
     for (const Var<double> block : group.blocks) tape.unfreeze(block);
     GradcheckOptions options;
     options.tolerance = 1e-6;
