@@ -8,12 +8,6 @@
 
 namespace hsi4d {
 
-namespace {
-
-constexpr Index kSmplhJoints = 52, kSmplJoints = 24;
-
-}  // namespace
-
 std::vector<PoseRun> smplx_runs(Index joints) {
   if (joints == kSmplxJoints) return {{0, 0, kSmplxJoints}};
   if (joints == kSmplhJoints) return {{0, 0, kBodyJoints}, {kBodyJoints, kFirstHandJoint, kSmplhJoints - kBodyJoints}};

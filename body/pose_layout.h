@@ -17,6 +17,9 @@ inline constexpr Index kFirstHandJoint = 25;
 inline constexpr Index kHandJoints = 15;
 inline constexpr Index kHandNumbers = 3 * kHandJoints;
 
+/// Of the other models: SMPL-H has no jaw and no eyes, SMPL no fingers either, but two hands after its body.
+inline constexpr Index kSmplhJoints = 52, kSmplJoints = 24;
+
 /// Larger numbers in a file are no metres, radians or coefficients of a body; with these, sums and products fit into
 /// floats. What messages call the range.
 inline constexpr double kLargestBodyNumber = 1e6;

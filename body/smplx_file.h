@@ -1,4 +1,5 @@
-// Files of SMPL-X body models (SMPLX_NEUTRAL.npz and the like), and bodies of other origin in the same layout.
+// Files of SMPL-X, SMPL-H and SMPL body models (SMPLX_NEUTRAL.npz and the like), and bodies of other origin in the same
+// layout.
 #pragma once
 
 #include <array>
@@ -59,12 +60,18 @@ struct SmplxModel {
 /// Joints are J_regressor times the shaped vertices. Where the file has `J_template` and `J_shapedirs` these say where
 /// joints are, and columns of `shapedirs` that `J_shapedirs` has not (D < C) leave joints where they are.
 ///
+/// SMPL-H (52 joints) and SMPL (24) have as many in place of 55, and 9 (J−1) columns of `posedirs`; all columns of
+/// their `shapedirs` are shape. The model that comes of them has SMPL-X's 55 joints: those that the file has not move
+/// nothing. Jaw and eyes are where the head is. Fingers of SMPL are where its hands are, whose weights go to the
+/// wrists; what turning these hands corrects is left out.
+///
 /// Weights whose sum is 1 to the rounding of floats (kWeightRounding) stay as they are; within kWeightSumTolerance they
 /// are divided by it and counted in `rescaled_weights`.
 ///
 /// Throws UserError when the file cannot be read; DataError naming file and array: no such archive, an array missing or
-/// of Python objects, a shape that does not fit, a number that is not finite or beyond 1e6, parents that are no tree, a
-/// face's vertex out of range, weights as in normalized_weights, more betas or expressions asked for than there are.
+/// of Python objects, a shape that does not fit, a number that is not finite or beyond 1e6, parents that are no tree or
+/// not that of SMPL, a face's vertex out of range, weights as in normalized_weights, more betas or expressions asked
+/// for than there are.
 SmplxModel read_smplx(const std::string& path, const SmplxFileOptions& options = {});
 /// As read_smplx, of a file in memory. @param name  what messages call it
 SmplxModel decode_smplx(std::span<const std::uint8_t> file, const std::string& name,

@@ -182,7 +182,11 @@ TEST_CASE("wrong shapes are refused, naming the array") {
   CHECK(error("f", {1, 4}) == "body.npz: array 'f': has shape [1,4]; [*,3] is needed");
   CHECK(error("weights", {3, 24}) == "body.npz: array 'weights': has shape [3,24]; [3,55] is needed");
   CHECK(error("weights", {4, 55}) == "body.npz: array 'weights': has shape [4,55]; [3,55] is needed");
-  CHECK(error("kintree_table", {2, 24}) == "body.npz: array 'kintree_table': has shape [2,24]; [2,55] is needed");
+  CHECK(error("kintree_table", {3, 55}) == "body.npz: array 'kintree_table': has shape [3,55]; [2,*] is needed");
+  for (const std::int64_t joints : {0, 22, 25, 54})
+    CHECK(error("kintree_table", {2, joints}) == "body.npz: array 'kintree_table': has shape [2," +
+                                                     std::to_string(joints) +
+                                                     "]; allowed: [2,55] (SMPL-X), [2,52] (SMPL-H), [2,24] (SMPL)");
   CHECK(error("shapedirs", {3, 3}) == "body.npz: array 'shapedirs': has shape [3,3]; [3,3,*] is needed");
   CHECK(error("shapedirs", {3, 3, 0}) ==
         "body.npz: array 'shapedirs': has shape [3,3,0], which holds 0 betas; 10 were asked for");
@@ -191,6 +195,95 @@ TEST_CASE("wrong shapes are refused, naming the array") {
   CHECK(error("hands_meanl", {1, 45}) == "body.npz: array 'hands_meanl': has shape [1,45]; [45] is needed");
   CHECK(error("hands_componentsl", {45, 12}) ==
         "body.npz: array 'hands_componentsl': has shape [45,12]; [*,45] is needed");
+}
+
+namespace {
+
+/// A body of SMPL-X whose jaw, eyes and, without fingers, fingers move nothing, and are where the head and the hands
+/// are.
+SmplxArrays quiet_arrays(bool has_fingers) {
+  SmplxArrays a = random_smplx({.vertices = 30, .columns = 10, .corrective_size = 0.01, .seed = 6});
+  for (std::size_t j = 22; j < (has_fingers ? 25u : 55u); ++j) {
+    const std::size_t instead = j < 25 ? 15 : j < 40 ? 20 : 21;  // head, wrists
+    const std::size_t at = j < 25 ? 15 : j < 40 ? 25 : 40;
+    for (std::size_t v = 0; v < 30; ++v) {
+      a.weights[55 * v + instead] += a.weights[55 * v + j];
+      a.weights[55 * v + j] = 0;
+      if (j != at) a.regressor[30 * j + v] = a.regressor[30 * at + v];
+    }
+    for (std::size_t row = 0; row < 90; ++row) std::fill_n(a.posedirs.begin() + long(486 * row + 9 * (j - 1)), 9, 0.0);
+  }
+  return a;
+}
+
+/// The model of a file with these joints alone. The last two of SMPL, the hands, have half of what the wrists move.
+SmplxModel model_of_joints(const SmplxArrays& a, const std::vector<std::size_t>& joints,
+                           const std::vector<std::int64_t>& tree) {
+  const auto count = static_cast<std::int64_t>(joints.size());
+  Numbers weights, regressor, posedirs;
+  for (std::size_t v = 0; v < 30; ++v) {
+    for (const std::size_t j : joints) {
+      const bool shares = count == 24 && (j == 20 || j == 21 || j == 25 || j == 40);
+      const std::size_t of = count == 24 && j == 25 ? 20 : count == 24 && j == 40 ? 21 : j;
+      weights.push_back(a.weights[55 * v + of] * (shares ? 0.5 : 1));
+    }
+  }
+  for (const std::size_t j : joints) {
+    for (std::size_t v = 0; v < 30; ++v) regressor.push_back(a.regressor[30 * j + v]);
+  }
+  for (std::size_t row = 0; row < 90; ++row) {
+    for (std::size_t i = 1; i < joints.size(); ++i) {
+      for (std::size_t c = 0; c < 9; ++c) {
+        const bool is_hand = count == 24 && i >= 22;  // what its turn corrects has no place
+        posedirs.push_back(is_hand ? 0.5 : a.posedirs[486 * row + 9 * (joints[i] - 1) + c]);
+      }
+    }
+  }
+  NpzWriter file;
+  file.add<double>("v_template", {30, 3}, a.v_template);
+  file.add<std::int64_t>("f", {std::int64_t(a.f.size()) / 3, 3}, a.f);
+  file.add<std::int64_t>("kintree_table", {2, count}, tree);
+  file.add<double>("shapedirs", {30, 3, 10}, a.shapedirs);
+  file.add<double>("J_regressor", {count, 30}, regressor);
+  file.add<double>("weights", {30, count}, weights);
+  file.add<double>("posedirs", {30, 3, 9 * (count - 1)}, posedirs);
+  return decode_smplx(file.encode(), "smpl.npz", {.betas = 10, .expressions = 0});
+}
+
+}  // namespace
+
+TEST_CASE("SMPL and SMPL-H are the body of SMPL-X whose other joints move nothing") {
+  for (const bool has_fingers : {true, false}) {
+    INFO((has_fingers ? "SMPL-H" : "SMPL"));
+    std::vector<std::size_t> joints;
+    for (std::size_t j = 0; j < 22; ++j) joints.push_back(j);
+    for (std::size_t j = 25; has_fingers && j < 55; ++j) joints.push_back(j);
+    if (!has_fingers) joints.insert(joints.end(), {25, 40});
+    const auto count = joints.size();
+    std::vector<std::int64_t> tree;
+    for (const std::size_t j : joints) {
+      const auto parent = std::find(joints.begin(), joints.end(), std::size_t(std::max(0, smplx_parents()[j])));
+      tree.push_back(j == 0 ? 4294967295 : parent - joints.begin());
+    }
+    tree.resize(2 * count);
+    const SmplxArrays a = quiet_arrays(has_fingers);
+    const SmplxModel expected = read_back(a, {.betas = 10, .expressions = 0});
+    const SmplxModel m = model_of_joints(a, joints, tree);
+    CHECK(m.parents == expected.parents);
+    CHECK(m.joints == expected.joints);
+    CHECK(m.joint_shape == expected.joint_shape);
+    CHECK(m.weights.weights == expected.weights.weights);
+    CHECK(m.correctives == expected.correctives);
+    CHECK(m.shape == expected.shape);
+    CHECK(m.expressions_in_file == 0);
+    CHECK(m.betas_in_file == 10);
+    CHECK(rest_body(m).joints == rest_body(expected).joints);
+
+    std::vector<std::int64_t> other = tree;
+    other[5] = 1;  // the right knee on the left hip
+    CHECK_THROWS_WITH(model_of_joints(a, joints, other),
+                      "smpl.npz: array 'kintree_table': the parent of joint 5 is 1; allowed: 2, as in SMPL and SMPL-H");
+  }
 }
 
 TEST_CASE("numbers that are not finite or huge are refused, naming their place") {
