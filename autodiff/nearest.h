@@ -20,8 +20,8 @@ struct NearestSet {
 /// @param sets     each with a point and a target at least
 /// @return         [S,3]
 /// Adjoint: points, targets, of the pair as it is: where another pair becomes the nearest, y jumps and |y|² has a kink
-/// (the gradient of min |p − q|² is that of the pair that has it). A pair whose distance is no number is never nearest.
-/// Throws InternalError for a set without a pair or beyond the arrays.
+/// (the gradient of min |p − q|² is that of the pair that has it). A pair whose distance is no number is not nearest
+/// where another one has a distance. Throws InternalError for a set without a pair or beyond the arrays.
 template <class S>
 Var<S> nearest_pairs(Var<S> points, Var<S> targets, std::vector<NearestSet> sets, Source where = Source::current());
 

@@ -16,8 +16,7 @@ struct AnnotatedContact {
       {};            ///< of the SMPL-X layout: the surface that follows one of them touches; none: `vertex`
   Index vertex = 0;  ///< of the body that the avatar was made on
   std::optional<Index> object = {};  ///< what is touched, in the clip's order; none: the scene
-  /// Where, metres: in the object's frame, or in the world; none: of the object whatever is nearest when a stage
-  /// begins.
+  /// Where, metres: in the object's frame, or in the world; none: of the object whatever is nearest.
   std::optional<Vector3<double>> place = {};
   double weight = 1;  ///< how much it counts
 };

@@ -58,10 +58,17 @@ void describe(ConfigFields& f, JointSettings& s) {
                ? "a hinge turns by half a turn at most in either direction; allowed: -3.14159 to 3.14159"
                : "";
   });
-  f.rule({"type", "parent", "limits"}, [&s]() -> std::string {
-    return s.type != JointType::kFree || (s.parent.empty() && s.limits.empty())
+  f.rule({"type", "parent", "axis", "origin", "limits"}, [&s]() -> std::string {
+    const JointSettings none;
+    const bool is_bare = s.parent.empty() && s.limits.empty() && s.axis == none.axis && s.origin == none.origin;
+    return s.type != JointType::kFree || is_bare
                ? ""
-               : "an object that is free has no parent and no limits; allowed: hinge, slide";
+               : "an object that is free has no parent, axis, origin and limits; allowed: hinge, slide";
+  });
+  f.rule({"type", "origin"}, [&s]() -> std::string {
+    return s.type != JointType::kSlide || s.origin == JointSettings().origin
+               ? ""
+               : "a slide has a direction alone; leave the origin out";
   });
 }
 

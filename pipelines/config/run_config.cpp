@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/config_file.h"
+#include "core/json_text.h"
 #include "core/text.h"
 #include "optim/loss_term.h"
 #include "pipelines/config/config_fields.h"
@@ -154,10 +155,23 @@ LossesOverMasks losses_over_masks(const RunConfig& config) {
 
 namespace {
 
+/// Leaves of the objects of `data` the joints, of those that hang on one.
+void leave_joints(ConfigValue& objects) {
+  for (ConfigMember& object : objects.members)
+    std::erase_if(object.value.members, [](const ConfigMember& setting) {
+      return setting.key != "joint" || string_member(setting.value, "type") == kJointTypes.front().name;
+    });
+  std::erase_if(objects.members, [](const ConfigMember& object) { return object.value.members.empty(); });
+}
+
 /// Leaves of the section `data` what is no file.
 void drop_files(ConfigValue& data) {
+  for (ConfigMember& setting : data.members) {
+    if (setting.key == "objects") leave_joints(setting.value);
+  }
   std::erase_if(data.members, [](const ConfigMember& setting) {
-    return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
+    const bool has_joints = setting.key == "objects" && !setting.value.members.empty();
+    return !has_joints && !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
   });
 }
 

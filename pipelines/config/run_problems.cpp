@@ -412,12 +412,13 @@ void add_keypoint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
 /// Objects on joints that stay where they are.
 void add_joint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   const bool is_moved = std::any_of(config.stages.begin(), config.stages.end(), [](const auto& stage) {
-    return find_entry(stage.second.optimize, kObjectJointGroup) != nullptr;
+    const ParameterGroupSettings* const group = find_entry(stage.second.optimize, kObjectJointGroup);
+    return group != nullptr && group->lr > 0 && stage.second.over != StageScope::kFirst;
   });
   for (const auto& [name, object] : config.data.objects) {
     if (object.joint.type == JointType::kFree || is_moved) continue;
     notes.push_back({LogLevel::kWarning, "data.objects." + name +
-                                             ": stays where its joint has it in frame 0: no stage moves the group " +
+                                             ": is on a joint along which it does not move: no stage moves the group " +
                                              kObjectJointGroup});
   }
 }
@@ -426,7 +427,12 @@ void add_joint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
 void add_prior_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   for (const auto& [name, stage] : config.stages) {
     const ParameterGroupSettings* const latents = find_entry(stage.optimize, kPoseLatents);
+    const auto holds = [&stage](const char* loss) {
+      const LossSettings* const found = find_entry(stage.losses, loss);
+      return found != nullptr && found->weight > 0;
+    };
     if (latents == nullptr || latents->lr == 0 || !stage.pose_weights.empty()) continue;
+    if (holds("pose_prior") || holds("joint_limits")) continue;
     notes.push_back({LogLevel::kInfo, "stages." + name + ": without pose_weights its " + kPoseLatents +
                                           " stand for poses one to one, and no prior holds the body"});
   }
@@ -488,18 +494,36 @@ void add_unknown_problems(const RunConfig& config, std::vector<RunProblem>& foun
         found.push_back({place,
                          "the mesh of /data/surface does not move with the scene; leave one of the two out",
                          {place, "/data/surface"}});
+      const bool moves_places = group == kSceneScaleGroup || group == kSceneHeightGroup || group == kObjectScaleGroup;
+      if (moves_places && !config.data.contacts.empty())
+        found.push_back({place,
+                         "places of /data/contacts do not follow what this group finds; find it in a run without them",
+                         {place, "/data/contacts"}});
+      for (const auto& [object, settings] : config.data.objects) {
+        if (!moves_places || settings.joint.type == JointType::kFree) continue;
+        const std::string joint = child_pointer("/data/objects", object) + "/joint";
+        found.push_back({place,
+                         "the axis of " + joint + " does not follow what this group finds; find it in a run without",
+                         {place, joint}});
+      }
     }
   }
 }
 
 /// A joint counts from frame 0 of its clip.
 void add_joint_problems(const RunConfig& config, std::vector<RunProblem>& found) {
-  for (const auto& [name, object] : config.data.objects) {
-    if (config.chain.empty() || object.joint.type == JointType::kFree) continue;
-    const std::string place = child_pointer("/data/objects", name) + "/joint";
-    found.push_back(
-        {place, "objects of a chain move freely; leave the joint out, or run its clips alone", {place, "/chain"}});
-  }
+  if (config.chain.empty()) return;
+  const auto look = [&found](const DataSettings& data, const std::string& pointer) {
+    for (const auto& [name, object] : data.objects) {
+      if (object.joint.type == JointType::kFree) continue;
+      const std::string place = child_pointer(pointer + "/objects", name) + "/joint";
+      found.push_back(
+          {place, "objects of a chain move freely; leave the joint out, or run its clips alone", {place, "/chain"}});
+    }
+  };
+  look(config.data, "/data");
+  for (std::size_t i = 0; i < config.chain.size(); ++i)
+    look(config.chain[i].data, "/chain/" + std::to_string(i) + "/data");
 }
 
 /// What is given in pictures that the lens has bent.

@@ -116,8 +116,10 @@ void begin_hinge(std::span<const Rigid<double>> poses, ObjectJoint& joint) {
     most = w.norm();
     joint.axis = w.normalized();
     const Matrix3<double> system = Matrix3<double>::Identity() - turn;  // of rank 2: it knows nothing along the axis
-    joint.origin = system.completeOrthogonalDecomposition().solve(
-        Vector3<double>(pose.translation - turn * joint.rest.translation));
+    Eigen::CompleteOrthogonalDecomposition<Matrix3<double>> decomposition;
+    decomposition.setThreshold(1e-6);  // its rounding would count as a third rank
+    decomposition.compute(system);
+    joint.origin = decomposition.solve(Vector3<double>(pose.translation - turn * joint.rest.translation));
   }
   if (most < kLeastTurn)
     throw UserError("the object turns by less than " + rounded(kLeastTurn / kDegree, 1) +

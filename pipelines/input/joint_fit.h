@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/angles.h"
 #include "pipelines/input/object_joint.h"
 #include "splat/gaussians.h"
 
@@ -18,7 +19,7 @@ struct JointFit {
 };
 
 /// Least turn and way, in any frame, that tell an axis: radians, metres.
-inline constexpr double kLeastTurn = 0.087, kLeastWay = 0.02;
+inline constexpr double kLeastTurn = 5 * kDegree, kLeastWay = 0.02;
 
 /// The joint whose poses are nearest: least Σ over frames and Gaussian centres x of |J(q_t) P_0 x − P_t x|², by the
 /// axis, a point of it, and q_t. Of a slide the axis is the longest of the ways' scatter; of a hinge it is found by

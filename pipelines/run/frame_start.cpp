@@ -49,6 +49,16 @@ void start_objects(StartFrom from, const SceneState* before, const std::vector<O
   }
 }
 
+/// Poses of objects on joints that know nothing of these: the nearest ones that their joints and limits allow.
+void put_on_joints(const Clip& clip, std::vector<ObjectPose>& objects) {
+  for (std::size_t o = 0; o < objects.size(); ++o) {
+    if (!clip.objects[o].joint) continue;
+    const ObjectJoint& joint = *clip.objects[o].joint;
+    const double q = std::clamp(joint_value(joint, parent_from_object(joint, objects, o)), joint.low, joint.high);
+    objects[o] = pose_of(compose(world_from_parent(joint, objects), on_joint(joint, q)));
+  }
+}
+
 }  // namespace
 
 void check_start(const StartSettings& settings, const Clip& clip) {
@@ -62,7 +72,10 @@ SceneState given_start(const Clip& clip, Index frame) {
   const auto index = static_cast<std::size_t>(frame);
   SceneState state = clip.first;
   if (!clip.estimate.empty()) state.body = clip.estimate[index];
-  if (!clip.object_estimate.empty()) state.objects = clip.object_estimate[index];
+  if (!clip.object_estimate.empty()) {
+    state.objects = clip.object_estimate[index];
+    put_on_joints(clip, state.objects);
+  }
   return state;
 }
 
@@ -77,6 +90,7 @@ SceneState frame_start(const StartSettings& settings, const Clip& clip, const st
   if (settings.root == StartFrom::kVelocity && before != nullptr)
     state.body.transl = continued(before->body.transl, state.body.transl);
   start_objects(settings.objects, before, clip.object_estimate.empty() ? nullptr : &clip.object_estimate[index], state);
+  if (settings.objects != StartFrom::kPrevious) put_on_joints(clip, state.objects);
   if (settings.camera == StartFrom::kVelocity && before != nullptr)
     state.camera_from_world = continued(before->camera_from_world, state.camera_from_world);
   return state;

@@ -1,4 +1,4 @@
-"""tools/export_motion.py and tools/export_vposer.py on made files, and what hsi4d makes of them.
+"""tools/export_motion.py, export_vposer.py and export_body.py on made files, and what hsi4d makes of them.
 
     python3 tests/tools/exporters_test.py TOOLS HSI4D        # the folder tools/ and the program
 
@@ -118,9 +118,9 @@ def wham():
     save("more.pkl", {0: {**one, "verts": np.zeros((4, 3)), "pose": one["pose_world"]}})
     assert "person 0: not read: pose, verts" in export("export_motion.py", "more.pkl", "w.npz")
     save("two.pkl", {"a": {**one, "frame_ids": np.array([0, 1, 2, 3])}, "b": one})
-    said = export("export_motion.py", "two.pkl", "b.npz")
+    said = export("export_motion.py", "two.pkl", "bad.npz")
     assert "person a is read (frames 0 to 3), not b (frames 3 to 7)" in said, said
-    assert "first_frame" not in np.load("b.npz")
+    assert "first_frame" not in np.load("bad.npz")
     save("wham_output.pkl", {0: one})
     said = export("export_motion.py", "wham_output.pkl", "w.npz")
     assert "5 frames, 1 of them interpolated, from frame 3 of the video" in said, said
@@ -422,9 +422,86 @@ def vposer():
     refused("has no tensor decoder_net.3.bias", "export_vposer.py", "V02_05", "v.npz")
 
 
+def pickled_class(home, name):
+    """A class that pickles as another library's, which need not be there."""
+    module = sys.modules.setdefault(home, type(sys)(home))
+    if not hasattr(module, name):
+        setattr(module, name, type(name, (), {"__module__": home}))
+    for end in (i for i, c in enumerate(home) if c == "."):
+        sys.modules.setdefault(home[:end], type(sys)(home[:end]))
+    return getattr(module, name)
+
+
+def bodies():
+    vertices, joints = 40, 24
+    parents = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21]
+    places = rng.random((vertices, 3))
+    regressor = np.zeros((joints, vertices))
+    regressor[np.arange(joints), np.arange(joints)] = 0.75
+    regressor[np.arange(joints), np.arange(joints) + 1] = 0.25
+    weights = np.zeros((vertices, joints))
+    weights[np.arange(vertices), np.arange(vertices) % joints] = 1
+    shapes = rng.random((vertices, 3, 10))
+
+    def sparse(kind, **state):
+        matrix = pickled_class("scipy.sparse." + kind[:3], kind)()
+        matrix.__dict__.update(state, _shape=(joints, vertices))
+        return matrix
+
+    def of_chumpy(**state):
+        array = pickled_class("chumpy.ch", "Ch")()
+        array.__dict__.update(state)
+        return array
+
+    ends = 2 * np.arange(joints + 1)
+    indices = np.stack([np.arange(joints), np.arange(joints) + 1], axis=1).reshape(-1)
+    data = np.tile([0.75, 0.25], joints)
+    by_columns = np.argsort(indices, kind="stable")
+    matrices = {"csr_matrix": dict(data=data, indices=indices, indptr=ends),
+                "csc_matrix": dict(data=data[by_columns], indices=np.repeat(np.arange(joints), 2)[by_columns],
+                                   indptr=np.concatenate([[0], np.cumsum(np.bincount(indices, minlength=vertices))])),
+                "coo_matrix": dict(data=data, row=np.repeat(np.arange(joints), 2), col=indices)}
+    model = {"v_template": places, "f": np.array([[0, 1, 2], [2, 3, 4]], np.uint32), "weights": weights,
+             "kintree_table": np.array([[4294967295, *parents[1:]], range(joints)], np.int64),
+             "shapedirs": of_chumpy(x=shapes), "posedirs": rng.random((vertices, 3, 207)), "bs_style": "lbs"}
+    for kind, state in matrices.items():
+        save("smpl.pkl", {**model, "J_regressor": sparse(kind, **state)})
+        assert "40 vertices, 24 joints, 10 shapes; not read: bs_style" in export("export_body.py", "smpl.pkl", "smpl.npz")
+        close(np.load("smpl.npz")["J_regressor"], regressor, 0)
+    close(np.load("smpl.npz")["shapedirs"], shapes, 0)
+    np.savez("P.npz", betas=np.zeros(10))
+    posed = subprocess.run([str(program), "pose", "--body-model", "smpl.npz", "--params", "P.npz", "--out", "F.npz"],
+                           capture_output=True, text=True)
+    assert posed.returncode == 0, posed.stderr
+    found = np.load("F.npz")
+    close(found["vertices"][0], places)
+    close(found["joints"][0][:22], (regressor @ places)[:22])
+    close(found["joints"][0][25:40], np.tile((regressor @ places)[22], (15, 1)))
+    good = {**model, "J_regressor": regressor}
+    for expected, change in (("holds chumpy.reordering.Select, which is no plain array",
+                              {"shapedirs": pickled_class("chumpy.reordering", "Select")()}),
+                             ("holds builtins.print, which is no plain array", {"x": print}),
+                             ("an array of chumpy that has no numbers", {"shapedirs": of_chumpy(a=1)}),
+                             ("J_regressor: a csr_matrix that does not fit",
+                              {"J_regressor": sparse("csr_matrix", data=data, indices=indices + 90, indptr=ends)}),
+                             ("weights: holds no numbers", {"weights": "many"}),
+                             ("has 23 joints", {"kintree_table": np.zeros((2, 23), np.int64)})):
+        save("bad.pkl", {**good, **change})
+        refused(expected, "export_body.py", "bad.pkl", "bad.npz")
+    save("bad.pkl", {name: array for name, array in good.items() if name != "f"})
+    refused("bad.pkl: has no f", "export_body.py", "bad.pkl", "bad.npz")
+    save("bad.pkl", [1])
+    refused("is no table of arrays", "export_body.py", "bad.pkl", "bad.npz")
+    pathlib.Path("bad.pkl").write_bytes(b"no pickle")
+    refused("is no pickle of a body model", "export_body.py", "bad.pkl", "bad.npz")
+    refused("No such file", "export_body.py", "nowhere.pkl", "bad.npz")
+    refused("allowed: a name that ends in .npz", "export_body.py", "smpl.pkl", "b.pkl")
+    assert not pathlib.Path("bad.npz").exists()
+
+
 folder = tempfile.TemporaryDirectory()
 os.chdir(folder.name)
-for test in (rotations, gvhmr, wham, lingo, emdb, rich, intercap, tram, whac, vposer):
+for test in (rotations, gvhmr, wham, lingo, emdb, rich, intercap, tram, whac, vposer, bodies):
     test()
     print(test.__name__, "passed")
 refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")

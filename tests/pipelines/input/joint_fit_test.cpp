@@ -117,6 +117,24 @@ TEST_CASE("of disturbed poses the joint is the one with the least squares") {
   }
 }
 
+TEST_CASE("a hinge that turns by little is found in poses that are off") {
+  const Gaussians object = leaf();
+  const ObjectJoint truth = door(JointType::kHinge);
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    RandomSequence random(seed);
+    std::vector<Rigid<double>> poses;
+    for (int t = 0; t < 8; ++t) {
+      Rigid<double> pose = on_joint(truth, t * 8 * kDegree / 7);
+      if (t > 0) pose.rotation = so3_exp(some_vector(random, 0.004)) * pose.rotation;
+      if (t > 0) pose.translation += some_vector(random, 0.002);
+      poses.push_back(pose);
+    }
+    const JointFit found = fit_joint(JointType::kHinge, poses, object);
+    INFO("seed " << seed);
+    for (const double distance : found.distances) CHECK(distance < 0.006);
+  }
+}
+
 TEST_CASE("an object that hardly moves tells no joint") {
   const Gaussians object = leaf();
   std::vector<Rigid<double>> poses(3, door(JointType::kHinge).rest);

@@ -7,6 +7,7 @@
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/joint_fit.h"
 #include "pipelines/run/depth_bias.h"
+#include "pipelines/run/frame_start.h"
 #include "tests/support/tiny_run.h"
 
 namespace joint_run_test {
@@ -93,6 +94,33 @@ TEST_CASE("a run finds how far a gate is open, within its limits and on its hing
   CHECK(values[3] == Approx(0.2).epsilon(1e-6));
 }
 
+TEST_CASE("a run on a joint is another run with another joint, and starts on it", "[run]") {
+  const GateClip gate;
+  const fs::path run = gate.folder.path() / "run";
+  execute_tiny(gate.config(), run.string());
+  RunOptions options;
+  options.folder = run.string();
+  options.resume = true;
+  CHECK_THROWS_WITH(execute_run(gate.config({"data.objects.gate.joint.limits=[0,0.2]"}), loss_terms(), options),
+                    Contains("joint"));
+
+  // Poses that know nothing of the joint.
+  Clip clip = read_clip(gate.config().data);
+  const ObjectJoint& joint = *clip.objects[0].joint;
+  clip.object_estimate.resize(clip.truth->size());
+  for (std::size_t t = 0; t < clip.truth->size(); ++t) {
+    clip.object_estimate[t] = (*clip.truth)[t].objects;
+    clip.object_estimate[t][0].translation += Vector3<double>(0.03, -0.02, 0.05);
+  }
+  const StartSettings by_estimate{.objects = StartFrom::kEstimate};
+  for (const SceneState& state : {given_start(clip, 3), frame_start(by_estimate, clip, {3, clip.first})}) {
+    const Rigid<double> pose = rigid_of(state.objects[0]), on = on_joint(joint, joint_value(joint, pose));
+    CHECK((on.translation - pose.translation).norm() < 1e-9);
+    CHECK((on.rotation - pose.rotation).norm() < 1e-9);
+    CHECK(joint_value(joint, pose) > 0.3);
+  }
+}
+
 TEST_CASE("what is wrong with joints is named", "[run]") {
   const GateClip gate;
   const auto fault = [&gate](const std::vector<std::string>& overrides) {
@@ -112,12 +140,14 @@ TEST_CASE("what is wrong with joints is named", "[run]") {
       Contains("the joint of \"gate\" has the parent \"gate\", which is no object that is named before; allowed: "
                "\"\", the scene"));
   CHECK_THAT(fault({joint + "type=free", joint + "parent=can"}), Contains("an object that is free has no parent"));
+  CHECK_THAT(fault({joint + "type=free"}), Contains("an object that is free has no parent, axis, origin"));
+  CHECK_THAT(fault({joint + "type=slide"}), Contains("a slide has a direction alone"));
   RunConfig still = gate.config();
   for (auto& [name, stage] : still.stages)
     std::erase_if(stage.optimize, [](const auto& group) { return group.first == "object_joint"; });
   std::string text;
   for (const RunNote& note : run_notes(still)) text += note.text + "\n";
-  CHECK_THAT(text, Contains("data.objects.gate: stays where its joint has it in frame 0"));
+  CHECK_THAT(text, Contains("data.objects.gate: is on a joint along which it does not move"));
 }
 
 TEST_CASE("the bias of depths leaves objects on their joints, and what hangs on a free one goes along", "[run]") {
