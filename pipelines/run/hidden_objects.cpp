@@ -7,7 +7,6 @@
 #include <span>
 
 #include "body/kinematics.h"
-#include "core/angles.h"
 #include "core/rigid.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
@@ -21,14 +20,11 @@ namespace {
 using Vector = Vector3<double>;
 
 constexpr std::array<Index, 2> kWrists = {20, 21};
-constexpr std::size_t kFramesOfCarrier = 4;  // that tell it
-constexpr double kStill = 0.01;              // metres that a hand may shift what it holds
+constexpr Index kChest = 9;
+constexpr std::size_t kFramesOfCarrier = 8;  // that tell it
+constexpr double kHandShift = 0.01;          // metres that a hand may shift what it holds
 constexpr double kHalf = 0.5;                // of a pixel is covered
-constexpr int kTurns = 8;                    // about the vertical
-
-Rigid<double> rigid_of(const ObjectPose& pose) { return {so3_exp(pose.rotation), pose.translation}; }
-
-ObjectPose pose_of(const Rigid<double>& rigid) { return {so3_log(rigid.rotation), rigid.translation}; }
+const Vector kBehindCamera(0, 0, -1000);     // metres
 
 /// world_from_carrier.
 Rigid<double> carrier_pose(const Clip& clip, const Carrier& carrier, const SceneState& state) {
@@ -107,6 +103,7 @@ ObjectPose at_mask(const Camera& camera, const Vector& center, ObjectPose pose) 
 
 std::string carrier_text(const Carrier& carrier) {
   if (!carrier.joint) return "stays where it was";
+  if (*carrier.joint == kChest) return "stays with the chest";
   return std::string("stays in the ") + (*carrier.joint == kWrists[0] ? "left" : "right") + " hand";
 }
 
@@ -134,14 +131,18 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
 
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen) {
   const std::span<const SceneState* const> last = std::span(seen).last(std::min(kFramesOfCarrier, seen.size()));
-  Carrier best;
-  double least = spread_with(clip, best, object, last) + kStill;
+  std::vector<Carrier> candidates;
   for (const Index wrist : kWrists) {
-    if (!is_touched(clip, object, wrist, *last.back())) continue;
-    const double spread = spread_with(clip, {wrist}, object, last);
+    if (is_touched(clip, object, wrist, *last.back())) candidates.push_back({wrist});
+  }
+  if (!candidates.empty()) candidates.push_back({kChest});
+  Carrier best;
+  double least = spread_with(clip, best, object, last) + kHandShift;
+  for (const Carrier& candidate : candidates) {
+    const double spread = spread_with(clip, candidate, object, last);
     if (spread >= least) continue;
     least = spread;
-    best.joint = wrist;
+    best = candidate;
   }
   return best;
 }
@@ -179,6 +180,13 @@ std::optional<double> object_iou(const StatePicture& picture, const ClipFrame& f
   return mask_iou(picture.objects.at(object), mask);
 }
 
+bool is_shown_at(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
+                 const SceneState& state, const ColorState& colors) {
+  SceneState without = state;
+  without.objects[object].translation = transform_point(inverse(state.camera_from_world), kBehindCamera);
+  return image_difference(config, clip, state, frame, colors) < image_difference(config, clip, without, frame, colors);
+}
+
 FoundObject find_object(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
                         const SceneState& state, const SceneState& last, const ColorState& colors) {
   Camera camera = clip.camera;
@@ -196,14 +204,9 @@ FoundObject find_object(const RunConfig& config, const Clip& clip, std::size_t o
   const Vector center = mask_center(frame.object_masks.at(object), config.data.mask_threshold);
   consider(state.objects[object], "as expected");
   consider(last.objects[object], "where it was");
-  consider(at_mask(camera, center, state.objects[object]), "as expected, at its mask");
-  consider(at_mask(camera, center, last.objects[object]), "where it was, at its mask");
-  const FoundObject place = best;
-  for (int turn = 1; turn < kTurns; ++turn) {
-    const double degrees = 360.0 * turn / kTurns;
-    ObjectPose turned = place.pose;
-    turned.rotation = so3_log(Matrix3<double>(so3_exp(Vector(0, 0, degrees * kPi / 180)) * so3_exp(turned.rotation)));
-    consider(turned, place.from + ", turned by " + std::to_string(360 * turn / kTurns) + " degrees");
+  if (center[2] > 0) {
+    consider(at_mask(camera, center, state.objects[object]), "as expected, at its mask");
+    consider(at_mask(camera, center, last.objects[object]), "where it was, at its mask");
   }
   return best;
 }

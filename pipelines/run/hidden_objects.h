@@ -1,4 +1,4 @@
-// Objects that a frame hides: they stay in the hand that held them, or where they lay, until they are seen again.
+// Objects that a frame hides: they stay with the person who carried them, or where they lay, until they are seen again.
 //
 // What pixels and masks do not show has no gradient of its own: it drifts, with what stands before it, or not at all
 // while a person walks away with it. So how much of each object a frame shows is known before its stages begin; what is
@@ -19,20 +19,20 @@
 
 namespace hsi4d {
 
-/// A frame hides an object of which both its mask and what is drawn show less than this share.
-inline constexpr double kHiddenBelow = 0.1;
+/// A frame hides an object of which it shows less than this share.
+inline constexpr double kHiddenBelow = 0.25;
 
 /// Intersection over union of an object's silhouette and mask below which it may be elsewhere; below which it is.
 inline constexpr double kDoubtfulIou = 0.5, kLostIou = 0.2;
 
 /// What an object goes with while nobody sees it: a joint of the body, or the world.
 struct Carrier {
-  std::optional<Index> joint;  ///< a wrist; none: the world
+  std::optional<Index> joint;  ///< a wrist or the chest; none: the world
 
   bool operator==(const Carrier&) const = default;
 };
 
-/// "stays in the left hand", "stays where it was".
+/// "stays in the left hand", "stays with the chest", "stays where it was".
 std::string carrier_text(const Carrier& carrier);
 
 /// How much of each object a frame shows: the pixels of its mask over those that it would cover alone, at most 1; 0
@@ -45,8 +45,14 @@ std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double
 /// @param picture  of the state, with silhouettes
 double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t object, const SceneState& state);
 
-/// A wrist if, in the last frames that show the object, it touched that hand and moved with it at least as well as it
-/// stood in the world; of two the one that it moved with better.
+/// Whether the frame is nearer to an image with the object where it is in `state` than to one without it: then it shows
+/// the object, whatever a mask says that may be missing.
+bool is_shown_at(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
+                 const SceneState& state, const ColorState& colors);
+
+/// What the object moved with best in the last frames that show it: the world, unless it touched a hand in the last of
+/// them; then that hand too, or the chest, before which hands carry what they hold. Hands are often hidden with what
+/// they hold and then hardly known, the chest is.
 /// @param seen  the frames that show the object, one at least: their states, in order
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen);
 
@@ -66,12 +72,12 @@ std::optional<double> object_iou(const StatePicture& picture, const ClipFrame& f
 /// A pose in which an object may be seen again.
 struct FoundObject {
   ObjectPose pose;
-  std::string from;  ///< "as expected", "where it was", with ", at its mask", ", turned by N degrees"; for the log
+  std::string from;  ///< "as expected", "where it was", or that with ", at its mask"; for the log
 };
 
 /// Looks for an object that is seen again: of the poses that it may have the one whose image is nearest to the frame's.
 /// Tried are the one that it has in `state`, that of the frame which showed it last, and both moved along the image to
-/// the centre of the object's mask; the best of these then turned about the vertical too.
+/// the centre of the object's mask, where that shows it.
 /// @param last  the state of the frame that showed it last
 FoundObject find_object(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
                         const SceneState& state, const SceneState& last, const ColorState& colors);

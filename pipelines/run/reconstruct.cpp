@@ -364,8 +364,9 @@ class Reconstruction {
       const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, done));
       SceneState carried = state;
       carried.objects[o] = carried_pose(clip_, carrier, o, shown, state);
-      if (is_hidden(index, o))  // by its mask, which may be missing
-        progress_.seen.back()[o] = drawn_share(clip_, picture_of_state(config_, clip_, carried, colors), o, carried);
+      double& share = progress_.seen.back()[o];
+      if (share == 0 && is_shown_at(config_, clip_, o, frame, state, colors))  // its mask is missing
+        share = drawn_share(clip_, picture_of_state(config_, clip_, state, colors), o, state);
       const std::string text = "frame " + std::to_string(index) + ": " + clip_.objects[o].name;
       if (is_hidden(index, o)) {
         state = carried;

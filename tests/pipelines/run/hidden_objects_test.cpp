@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr Index kLeftWrist = 20, kRightWrist = 21;
+constexpr Index kChest = 9, kLeftWrist = 20, kRightWrist = 21;
 constexpr double kThreshold = 0.5;
 const std::vector<std::string> kNone;
 
@@ -31,14 +31,14 @@ Rigid<double> pose_in(const SceneState& state) {
   return {so3_exp(state.objects[0].rotation), state.objects[0].translation};
 }
 
-/// Turns and moves the body, about the world's axes.
-SceneState moved(const Clip& clip, const SceneState& state, double turn, const Vector3<double>& step) {
+/// Turns and moves the body, about the world's axes, and bends its elbows.
+SceneState moved(const SceneState& state, double turn, const Vector3<double>& step) {
   SceneState next = state;
   const Matrix3<double> rotation = so3_exp(Vector3<double>(0, 0, turn));
   next.body.set_rotation(0, so3_log(Matrix3<double>(rotation * so3_exp(state.body.rotation_of(0)))));
   next.body.transl += step;
-  next.body.set_rotation(19, Vector3<double>(0.1 + turn, -0.2, 0.3));
-  (void)clip;
+  for (const Index elbow : {Index{18}, Index{19}})
+    next.body.set_rotation(elbow, Vector3<double>(0.1 + turn, -0.2, 0.3));
   return next;
 }
 
@@ -53,7 +53,7 @@ SceneState held_by(const Clip& clip, Index wrist) {
 std::vector<SceneState> walk(const Clip& clip, const Carrier& carrier, const SceneState& first) {
   std::vector<SceneState> states = {first};
   for (int t = 1; t < 4; ++t) {
-    SceneState next = moved(clip, states.back(), 0.3, {0.1, -0.05, 0.01});
+    SceneState next = moved(states.back(), 0.3, {0.1, -0.05, 0.01});
     next.objects[0] = carried_pose(clip, carrier, 0, states.back(), next);
     states.push_back(next);
   }
@@ -72,12 +72,12 @@ TEST_CASE("what a hand carries keeps its distances from the hand's joints") {
   const Clip clip = tiny_clip();
   for (const Index wrist : {kLeftWrist, kRightWrist}) {
     const std::vector<SceneState> states = walk(clip, {wrist}, held_by(clip, wrist));
+    const Index thumb = wrist == kLeftWrist ? 37 : 52, index_finger = wrist == kLeftWrist ? 25 : 40;
     const auto distances = [&](const SceneState& state) {
       std::vector<double> all;
-      for (const Index joint :
-           {wrist, wrist == kLeftWrist ? Index{25} : Index{40}, wrist == kLeftWrist ? Index{31} : Index{46}}) {
+      for (const Index joint : {wrist, thumb, index_finger}) {
         for (const Vector3<double>& corner : {Vector3<double>(0, 0, 0), Vector3<double>(0.1, 0.2, -0.1)})
-          all.push_back((transform_point(pose_in(state), corner) - joint_of(clip, state, wrist)).norm() + 0 * joint);
+          all.push_back((transform_point(pose_in(state), corner) - joint_of(clip, state, joint)).norm());
       }
       return all;
     };
@@ -89,6 +89,13 @@ TEST_CASE("what a hand carries keeps its distances from the hand's joints") {
     CHECK(carrier_of(clip, 0, pointers(states)) == Carrier{wrist});
     CHECK(carrier_of(clip, 0, {&states.front()}) == Carrier{wrist});  // touched, and nothing speaks against it
   }
+}
+
+TEST_CASE("what stays before the chest while hands move goes with the chest") {
+  const Clip clip = tiny_clip();
+  const std::vector<SceneState> states = walk(clip, {kChest}, held_by(clip, kRightWrist));
+  CHECK(carrier_of(clip, 0, {&states[3], &states[2], &states[1], &states[0]}) == Carrier{kChest});
+  CHECK(carrier_text({kChest}) == "stays with the chest");
 }
 
 TEST_CASE("what stands while hands move, or is far from them, goes with the world") {
@@ -105,7 +112,7 @@ TEST_CASE("what stands while hands move, or is far from them, goes with the worl
 
 TEST_CASE("between two frames an object turns and moves evenly as its carrier sees it") {
   const Clip clip = tiny_clip();
-  for (const Carrier& carrier : {Carrier{}, Carrier{kRightWrist}}) {
+  for (const Carrier& carrier : {Carrier{}, Carrier{kRightWrist}, Carrier{kChest}}) {
     std::vector<SceneState> states = walk(clip, carrier, held_by(clip, kRightWrist));
     // In the last frame it is 3 cm and 0.3 radians from where its carrier took it.
     const SceneState carried = states[3];
@@ -161,6 +168,9 @@ TEST_CASE("an object that is seen again is found where the image shows it") {
   found = find_object(config, clip, 0, frame, aside, aside, colors);
   CHECK_THAT(found.from, Contains("at its mask"));
   CHECK((found.pose.translation - clip.first.objects[0].translation).norm() < 0.1);
+  ClipFrame unmasked = frame;
+  unmasked.object_masks[0] = Image(1, kTinyPixels, kTinyPixels);
+  CHECK(find_object(config, clip, 0, unmasked, wrong, clip.first, colors).from == "where it was");
 }
 
 TEST_CASE("what is drawn of an object behind everything is nothing of it") {
@@ -175,6 +185,8 @@ TEST_CASE("what is drawn of an object behind everything is nothing of it") {
   const Rigid<double> world_from_camera = inverse(clip.first.camera_from_world);
   behind.objects[0].translation = transform_point(world_from_camera, Vector3<double>(0, 0, -1));
   const StatePicture hidden = picture_of_state(config, clip, behind, colors);
+  CHECK(is_shown_at(config, clip, 0, read_frame(clip, 0), clip.first, colors));
+  CHECK_FALSE(is_shown_at(config, clip, 0, read_frame(clip, 0), behind, colors));
   CHECK(drawn_share(clip, hidden, 0, behind) == 0);
   CHECK(object_iou(hidden, read_frame(clip, 0), 0) == 0);
   ClipFrame frame = read_frame(clip, 0);
@@ -187,29 +199,44 @@ TEST_CASE("a run keeps what is hidden with its carrier, and has the same bits af
   SyntheticSettings settings = TinyDataset::settings();
   settings.motion = SyntheticMotionKind::kWalk;
   settings.object = SyntheticObjectKind::kVase;
-  settings.frames = 12;
-  settings.frame_rate = 2.5;  // from frame 6 to 8 the vase is behind the body
+  settings.frames = 24;
+  settings.frame_rate = 5;  // from frame 12 to 19 the vase is behind the body, or nearly
   settings.size_px = 96;
   ConfigProblems problems;
   const ConfigValue stages = load_config_text(kTinyStages, "tiny.json", here.path(), {}, problems);
   write_dataset(settings, video_render_settings(), "data", {}, stages);
-  const RunConfig config = config_in("data", {"start.objects=best", "start.root=estimate"});
+  here.write("hidden.json", R"({
+    "extends": "data/config.json",
+    "start": {"objects": "best", "root": "estimate"},
+    "stages": {
+      "interaction": {
+        "iterations": 30,
+        "losses": {
+          "depth": null,
+          "center": {"weight": 1e-5, "by_share": true, "moves": "object"},
+          "mask": {"weight": 1, "human": false},
+          "object_smooth": {"weight": 1, "free": 2}
+        }
+      }
+    }})");
+  const RunConfig config = load_run_config("hidden.json", {}, descriptions_of(loss_terms()));
   execute_tiny(config, "run");
   const std::string log = file_text("run/log.txt");
-  CHECK_THAT(log, Contains("frame 7: vase is hidden, and stays in the "));
+  CHECK_THAT(log, Contains("frame 15: vase is hidden, and stays with the chest"));
   CHECK_THAT(log, Contains(": vase is seen again, "));
   const nlohmann::json summary = json_of("run/summary.json");
-  CHECK(summary["per_frame"][6]["object_seen_share"].get<double>() < kHiddenBelow);
+  CHECK(summary["per_frame"][14]["object_seen_share"].get<double>() < kHiddenBelow);
   CHECK(summary["per_frame"][0]["object_seen_share"].get<double>() > 0.3);
   CHECK(summary["quality"].contains("object_iou"));
-  // While nobody sees it, it goes with the hands.
-  const double of_hidden = summary["per_frame"][6]["object_translation_cm"], way = [&] {
+  // While nobody sees it, it goes with the person.
+  const double of_hidden = summary["per_frame"][14]["object_translation_cm"], way = [&] {
     const auto truth = read_object_tracks("data/truth/objects.npz", {"vase"});
-    return 100 * (truth[7][0].translation - truth[5][0].translation).norm();
+    return 100 * (truth[15][0].translation - truth[11][0].translation).norm();
   }();
   CAPTURE(of_hidden, way);
   CHECK(of_hidden < way / 2);
-  for (const int last : {6 * kPerFrame + 12, 9 * kPerFrame + 3}) {
+  constexpr int kEach = kPerFrame + 20;
+  for (const int last : {14 * kEach + 12, 21 * kEach + 3}) {
     int count = 0;
     const std::string run = "stopped" + std::to_string(last);
     CHECK_THROWS_AS(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
@@ -223,7 +250,7 @@ TEST_CASE("where masks are missing, what is drawn tells that an object is not hi
   const CopiedDataset copy;
   write_image((copy.path / "masks" / kTinyObject / "0002.png").string(), Image(1, kTinyPixels, kTinyPixels));
   execute_tiny(config_in(copy.path, {"start.objects=best"}), "run");
-  CHECK_THAT(file_text("run/log.txt"), !Contains("is hidden"));
+  CHECK_THAT(file_text("run/log.txt"), !Contains("is hidden, and "));
   CHECK_FALSE(json_of("run/summary.json")["per_frame"][1].contains("object_iou"));
 }
 
@@ -246,7 +273,7 @@ TEST_CASE("objects that the first pass lost are found by a later one", "[run][pa
   const double lost = number_in(summary.metrics[1].values, "object_translation_cm"),
                found = number_in(summary.metrics[3].values, "object_translation_cm");
   CAPTURE(lost, found);
-  CHECK(lost > 20);
+  CHECK(lost > 10);
   CHECK(found < lost / 2);
 }
 
