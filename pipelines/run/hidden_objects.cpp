@@ -102,9 +102,7 @@ ObjectPose at_mask(const Camera& camera, const Vector& center, ObjectPose pose) 
 }  // namespace
 
 std::string carrier_text(const Carrier& carrier) {
-  if (!carrier.joint) return "stays where it was";
-  if (*carrier.joint == kChest) return "stays with the chest";
-  return std::string("stays in the ") + (*carrier.joint == kWrists[0] ? "left" : "right") + " hand";
+  return carrier.joint ? "stays with the chest" : "stays where it was";
 }
 
 std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double mask_threshold,
@@ -131,20 +129,12 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
 
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen) {
   const std::span<const SceneState* const> last = std::span(seen).last(std::min(kFramesOfCarrier, seen.size()));
-  std::vector<Carrier> candidates;
-  for (const Index wrist : kWrists) {
-    if (is_touched(clip, object, wrist, *last.back())) candidates.push_back({wrist});
-  }
-  if (!candidates.empty()) candidates.push_back({kChest});
-  Carrier best;
-  double least = spread_with(clip, best, object, last) + kHandShift;
-  for (const Carrier& candidate : candidates) {
-    const double spread = spread_with(clip, candidate, object, last);
-    if (spread >= least) continue;
-    least = spread;
-    best = candidate;
-  }
-  return best;
+  const bool is_held = std::any_of(kWrists.begin(), kWrists.end(),
+                                   [&](Index wrist) { return is_touched(clip, object, wrist, *last.back()); });
+  const Carrier person{kChest};
+  if (is_held && spread_with(clip, person, object, last) < spread_with(clip, {}, object, last) + kHandShift)
+    return person;
+  return {};
 }
 
 ObjectPose carried_pose(const Clip& clip, const Carrier& carrier, std::size_t object, const SceneState& from,

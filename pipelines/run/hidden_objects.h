@@ -27,12 +27,12 @@ inline constexpr double kDoubtfulIou = 0.5, kLostIou = 0.2;
 
 /// What an object goes with while nobody sees it: a joint of the body, or the world.
 struct Carrier {
-  std::optional<Index> joint;  ///< a wrist or the chest; none: the world
+  std::optional<Index> joint;  ///< the chest; none: the world
 
   bool operator==(const Carrier&) const = default;
 };
 
-/// "stays in the left hand", "stays with the chest", "stays where it was".
+/// "stays with the chest", "stays where it was".
 std::string carrier_text(const Carrier& carrier);
 
 /// How much of each object a frame shows: the pixels of its mask over those that it would cover alone, at most 1; 0
@@ -50,9 +50,9 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
 bool is_shown_at(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
                  const SceneState& state, const ColorState& colors);
 
-/// What the object moved with best in the last frames that show it: the world, unless it touched a hand in the last of
-/// them; then that hand too, or the chest, before which hands carry what they hold. Hands are often hidden with what
-/// they hold and then hardly known, the chest is.
+/// The chest, if the object touched a hand in the last frame that shows it, and in the last frames that do moved with
+/// the chest at least as well as it stood in the world; else the world. Hands themselves are often hidden with what
+/// they hold, and then hardly known.
 /// @param seen  the frames that show the object, one at least: their states, in order
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen);
 

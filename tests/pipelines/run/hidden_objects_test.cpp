@@ -68,7 +68,7 @@ std::vector<const SceneState*> pointers(const std::vector<SceneState>& states) {
 
 }  // namespace
 
-TEST_CASE("what a hand carries keeps its distances from the hand's joints") {
+TEST_CASE("what a joint carries keeps its distances from the joints that hang on it") {
   const Clip clip = tiny_clip();
   for (const Index wrist : {kLeftWrist, kRightWrist}) {
     const std::vector<SceneState> states = walk(clip, {wrist}, held_by(clip, wrist));
@@ -86,8 +86,6 @@ TEST_CASE("what a hand carries keeps its distances from the hand's joints") {
       for (std::size_t i = 0; i < first.size(); ++i) CHECK(now[i] == Approx(first[i]).margin(1e-12));
     }
     CHECK((states.back().objects[0].translation - states.front().objects[0].translation).norm() > 0.05);
-    CHECK(carrier_of(clip, 0, pointers(states)) == Carrier{wrist});
-    CHECK(carrier_of(clip, 0, {&states.front()}) == Carrier{wrist});  // touched, and nothing speaks against it
   }
 }
 
@@ -95,6 +93,7 @@ TEST_CASE("what stays before the chest while hands move goes with the chest") {
   const Clip clip = tiny_clip();
   const std::vector<SceneState> states = walk(clip, {kChest}, held_by(clip, kRightWrist));
   CHECK(carrier_of(clip, 0, {&states[3], &states[2], &states[1], &states[0]}) == Carrier{kChest});
+  CHECK(carrier_of(clip, 0, {&states.front()}) == Carrier{kChest});  // touched, and nothing speaks against it
   CHECK(carrier_text({kChest}) == "stays with the chest");
 }
 
@@ -107,7 +106,6 @@ TEST_CASE("what stands while hands move, or is far from them, goes with the worl
   CHECK(carrier_of(clip, 0, pointers(walk(clip, {kRightWrist}, far))) == Carrier{});
   CHECK(carried_pose(clip, {}, 0, touched[0], touched[3]).translation == touched[0].objects[0].translation);
   CHECK(carrier_text({}) == "stays where it was");
-  CHECK(carrier_text({kLeftWrist}) == "stays in the left hand");
 }
 
 TEST_CASE("between two frames an object turns and moves evenly as its carrier sees it") {
