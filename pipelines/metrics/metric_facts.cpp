@@ -40,6 +40,8 @@ const std::vector<MetricFacts>& metric_facts() {
        "Share of the background that has another colour than the scene, displacement and exposure apart", 3, -1},
       {"ssim", "SSIM", "", "Structural similarity", 4, 1},
       {"silhouette_iou", "silhouette IoU", "", "Intersection over union of the human's silhouette and mask", 3, 1},
+      {"object_iou", "object IoU", "", "The same of the objects that their masks show", 3, 1},
+      {"object_seen_share", "objects seen", "", "Share of the objects that their masks show", 3, 0},
       {"keypoints_px", "2D keypoints", "px", "Mean distance of the body in the image from where a detector found it", 1,
        -1},
       {"keypoints_pck", "PCK", "",

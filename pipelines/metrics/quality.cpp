@@ -15,8 +15,9 @@ struct Threshold {
   double pass, check;
 };
 
-constexpr std::array<Threshold, 7> kThresholds = {{
+constexpr std::array<Threshold, 8> kThresholds = {{
     {"silhouette_iou", 0.85, 0.7},
+    {"object_iou", 0.7, 0.5},
     {"keypoints_pck", 0.9, 0.7},
     {"psnr_background_db", 24, 18},
     {"camera_drift_px", 1, 3},

@@ -21,9 +21,9 @@ struct QualityGate {
 /// "pass", "check" or "fail".
 std::string_view word_of(const QualityGate& gate);
 
-/// The gates of the metrics that a result has: silhouette_iou, keypoints_pck, psnr_background_db, camera_drift_px,
-/// background_change, floor_drift_mm, foot_sliding_mm and jitter. That of the jitter grows with the rate, as the jitter
-/// of noise does.
+/// The gates of the metrics that a result has: silhouette_iou, object_iou, keypoints_pck, psnr_background_db,
+/// camera_drift_px, background_change, floor_drift_mm, foot_sliding_mm and jitter. That of the jitter grows with the
+/// rate, as the jitter of noise does.
 /// @param frame_rate  frames a second
 std::vector<QualityGate> quality_of(const MetricValues& values, double frame_rate);
 

@@ -305,6 +305,23 @@ std::optional<DepthBias> stored_bias(const Checkpoint& checkpoint, const Clip& c
 
 // ---- Other entries ----
 
+constexpr const char* kSeen = "objects_seen";  // by frame, a number an object
+
+void store_seen(const std::vector<std::vector<double>>& seen, Checkpoint& checkpoint) {
+  std::vector<double> shares;
+  for (const std::vector<double>& frame : seen) shares.insert(shares.end(), frame.begin(), frame.end());
+  checkpoint.set(kSeen, std::move(shares));
+}
+
+std::vector<std::vector<double>> stored_seen(const Checkpoint& checkpoint, const Clip& clip, std::size_t frames) {
+  std::vector<std::vector<double>> seen;
+  if (!checkpoint.has(kSeen)) return seen;
+  const auto objects = std::ssize(clip.objects);
+  const std::vector<double>& shares = stored_states(checkpoint, kSeen, frames * clip.objects.size());
+  for (auto next = shares.begin(); next != shares.end(); next += objects) seen.emplace_back(next, next + objects);
+  return seen;
+}
+
 void store_start(const StartTotals& start, Checkpoint& checkpoint) {
   std::vector<std::int64_t> frames;
   for (const auto& part : start.frames) frames.insert(frames.end(), part.begin(), part.end());
@@ -405,6 +422,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   store_unknowns(progress.unknowns, checkpoint);
   store_later(progress.later, checkpoint);
   if (progress.bias) store_bias(*progress.bias, checkpoint);
+  if (!progress.seen.empty()) store_seen(progress.seen, checkpoint);
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
@@ -458,6 +476,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   progress.unknowns = stored_unknowns(checkpoint, clip);
   progress.later = stored_later(checkpoint, clip, later);
   progress.bias = stored_bias(checkpoint, clip);
+  progress.seen = stored_seen(checkpoint, clip, static_cast<std::size_t>(frames[0]));
   const std::vector<float>& covered = checkpoint.floats("covered");
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);

@@ -75,10 +75,12 @@ struct RunProgress {
   std::vector<PlaceSigmas> sigmas;                   ///< [frame]; none unless the config asks for it
   ColorState colors;                                 ///< after the last frame done
   ClipUnknowns unknowns;                             ///< what stages over the first frame found of the clip
-  std::optional<DepthBias> bias;                     ///< taken from all that stages over frames found; none: not yet
-  std::vector<LaterStage> later;                     ///< those that have begun, in the order in which they run
-  std::vector<MetricValues> result_errors;           ///< [frame] of images after the last of them; in no checkpoint
-  double seconds = 0;                                ///< of what is done
+  std::vector<std::vector<double>> seen;  ///< [frame][object] the share that is; none unless start.objects is best
+  std::optional<DepthBias> bias;          ///< taken from all that stages over frames found; none: not yet
+  std::vector<LaterStage> later;          ///< those that have begun, in the order in which they run
+  std::vector<std::vector<std::optional<double>>> object_ious;  ///< [frame][object] of images of the result; likewise
+  std::vector<MetricValues> result_errors;  ///< [frame] of images after the last of them; in no checkpoint
+  double seconds = 0;                       ///< of what is done
   std::string isa;  ///< isa_name of who wrote the checkpoint; empty: not read from one, or from an older one
 
   /// Frames done, frame 0 included, in the first pass.

@@ -18,6 +18,7 @@
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
+#include "pipelines/graph/frame_masks.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/input_hashes.h"
@@ -30,6 +31,7 @@
 #include "pipelines/run/depth_bias.h"
 #include "pipelines/run/frame_start.h"
 #include "pipelines/run/heading_starts.h"
+#include "pipelines/run/hidden_objects.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/stage_log.h"
 #include "pipelines/run/start_choice.h"
@@ -127,12 +129,19 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
+    if (progress_.later.empty()) lay_hidden_objects();
     if (config_.remove_depth_bias && !progress_.bias) remove_bias();
-    run_later_stages();
+    if (has_later()) {
+      run_later_stages();
+    } else if (are_drawn_again()) {
+      progress_.image_errors.resize(1);
+      write_results_of_frames(progress_.image_errors);
+    }
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
     warn_of_still_groups(progress_.still, config_);
     warn_of_left_ranges(progress_.left_ranges, config_);
+    warn_of_lost(progress_.object_ious, clip_);
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors, progress_.sigmas);
     if (!progress_.unknowns.betas.empty()) write_found_avatar();
@@ -158,6 +167,9 @@ class Reconstruction {
   /// over frames go through them again.
   std::size_t later_stage() const { return first_stages_ + frame_stages_; }
   bool has_later() const { return !order_.later.empty(); }
+
+  /// Whether frames change after the last one is done.
+  bool are_drawn_again() const { return config_.remove_depth_bias || follows_hidden() || has_later(); }
 
   /// Steps of the stages [begin, end), each once.
   std::int64_t steps_of(std::size_t begin, std::size_t end) const {
@@ -199,6 +211,7 @@ class Reconstruction {
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
       if (config_.uncertainty && first_stages_ == 0) progress_.sigmas = {sigmas_};
+      if (follows_hidden() && first_stages_ == 0) progress_.seen = {all_seen()};
       const ClipFrame frame = read_frame(clip_, 0);
       warn_of_other_first_frame(render_state(config_, clip_, clip_.first, start_colors_), frame.target);
       add_covered(frame, config_.data, progress_.covered);
@@ -233,8 +246,7 @@ class Reconstruction {
   /// Shows the frames that are done, and from then on what comes.
   void begin_events() {
     if (!config_.log.tensorboard) return remove_run_events(folder_.paths());
-    const bool are_drawn_again = config_.remove_depth_bias || has_later();
-    events_.emplace(folder_, ShownImages{config_.log.images_every, are_drawn_again}, first_worked_on(),
+    events_.emplace(folder_, ShownImages{config_.log.images_every, are_drawn_again()}, first_worked_on(),
                     progress_.frames_done());
   }
 
@@ -254,6 +266,7 @@ class Reconstruction {
       take_unknowns(s, found, state);
       progress_.first_frame.push_back({state, totals});
     }
+    if (follows_hidden()) progress_.seen = {all_seen()};
     end_frame(0, frame, std::vector(frame_stages_, state), begin);
   }
 
@@ -306,24 +319,134 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     const ClipFrame frame = read_frame(clip_, index);
     add_covered(frame, config_.data, progress_.covered);
-    SceneState state = frame_start(config_.start, clip_, progress_.after_stage.back());
+    const std::vector<SceneState>& done = progress_.after_stage.back();
+    SceneState state = frame_start(config_.start, clip_, done);
     ColorState colors = progress_.colors;
     std::vector<SceneState> after;
-    bool has_start = !chooses_start(config_.start);
+    bool has_start = false;
     for (std::size_t s = 0; s < frame_stages_; ++s) {
       if (!has_start && config_.stages[first_stages_ + s].second.draw == Draw::kAll) {
-        state = chosen_start(index, frame, state, colors);
+        if (chooses_start(config_.start)) state = chosen_start(index, frame, state, colors);
+        if (follows_hidden()) start_hidden_objects(index, frame, colors, state);
         has_start = true;
       }
-      run_in_frame(first_stages_ + s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors,
-                   progress_.totals[s]);
+      run_in_frame(first_stages_ + s, {index, frame, progress_.covered, done}, state, colors, progress_.totals[s]);
+      if (has_start) carry_hidden_objects(index, done, state);
       after.push_back(state);
     }
+    if (follows_hidden() && !has_start) progress_.seen.push_back(all_seen());
     progress_.colors = std::move(colors);
     write_start_image(index, frame);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     end_frame(index, frame, after, begin);
   }
+
+  // ---- Objects that are hidden ----
+
+  /// What the best start is asked of can be seen; what cannot goes with its carrier.
+  bool follows_hidden() const { return config_.start.objects == StartFrom::kBest && !clip_.objects.empty(); }
+
+  std::vector<double> all_seen() const { return std::vector(clip_.objects.size(), 1.0); }
+
+  bool is_hidden(Index frame, std::size_t object) const {
+    return frame < std::ssize(progress_.seen) && progress_.seen[static_cast<std::size_t>(frame)][object] < kHiddenBelow;
+  }
+
+  /// Notes what the frame shows of the objects, lets those that it hides go with their carriers, and looks for those
+  /// that it shows again.
+  void start_hidden_objects(Index index, const ClipFrame& frame, const ColorState& colors, SceneState& state) {
+    const std::vector<SceneState>& done = progress_.after_stage.back();
+    progress_.seen.push_back(seen_shares(clip_, frame, config_.data.mask_threshold, state));
+    for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
+      if (!is_hidden(index - 1, o) && !is_hidden(index, o)) continue;
+      const Index last = last_seen(index, o);
+      const SceneState& shown = done[static_cast<std::size_t>(last)];
+      const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, done));
+      SceneState carried = state;
+      carried.objects[o] = carried_pose(clip_, carrier, o, shown, state);
+      double& share = progress_.seen.back()[o];
+      if (share == 0 && is_shown_at(config_, clip_, o, frame, state, colors))  // its mask is missing
+        share = drawn_share(clip_, picture_of_state(config_, clip_, state, colors), o, state);
+      const std::string text = "frame " + std::to_string(index) + ": " + clip_.objects[o].name;
+      if (is_hidden(index, o)) {
+        state = carried;
+        folder_.note(text + " is hidden, and " + carrier_text(carrier));
+      } else if (is_hidden(index - 1, o)) {
+        const FoundObject found = find_object(config_, clip_, o, frame, carried, shown, colors);
+        state.objects[o] = found.pose;
+        folder_.note(text + " is seen again, " + found.from);
+      }
+    }
+  }
+
+  /// Whatever stages made of objects that the frame hides, these go with their carriers.
+  /// @param known  states by frame: those before, or, of a later pass, of all as the stages before it left them
+  void carry_hidden_objects(Index index, const std::vector<SceneState>& known, SceneState& state) const {
+    for (std::size_t o = 0; follows_hidden() && o < clip_.objects.size(); ++o) {
+      if (!is_hidden(index, o)) continue;
+      const Index last = last_seen(index, o);
+      const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, known));
+      const Index from = std::ssize(known) > index ? index : last;
+      state.objects[o] = carried_pose(clip_, carrier, o, known[static_cast<std::size_t>(from)], state);
+    }
+  }
+
+  /// The last frame before that shows the object; the first one does.
+  Index last_seen(Index before, std::size_t object) const {
+    Index last = before - 1;
+    while (last > 0 && is_hidden(last, object)) --last;
+    return last;
+  }
+
+  /// The states of frames up to `last` that show the object.
+  std::vector<const SceneState*> frames_with(std::size_t object, Index last,
+                                             const std::vector<SceneState>& states) const {
+    std::vector<const SceneState*> seen;
+    for (Index t = 0; t <= last; ++t) {
+      if (!is_hidden(t, object)) seen.push_back(&states[static_cast<std::size_t>(t)]);
+    }
+    return seen;
+  }
+
+  /// Objects that the frame shows elsewhere are looked for from where the frame before has them now, and from the next
+  /// frame that shows them.
+  /// @param known  states by frame, as the stages before the pass left them
+  void look_for_lost_objects(Index index, const ClipFrame& frame, const std::vector<SceneState>& known,
+                             const SceneState& before, SceneState& state) {
+    const StatePicture picture = picture_of_state(config_, clip_, state, progress_.colors);
+    for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
+      const std::optional<double> iou = object_iou(picture, frame, o);
+      if (is_hidden(index, o) || !iou || *iou >= kDoubtfulIou) continue;
+      FoundObject found = find_object(config_, clip_, o, frame, state, before, progress_.colors);
+      state.objects[o] = found.pose;
+      std::string text = "frame " + std::to_string(index) + ", pass " + std::to_string(pass_) + ": " +
+                         clip_.objects[o].name + " is looked for, by frame " + std::to_string(index - 1) + ": " +
+                         found.from;
+      Index next = index + 1;
+      while (next < clip_.frames() && is_hidden(next, o)) ++next;
+      if (next < clip_.frames()) {
+        found = find_object(config_, clip_, o, frame, state, known[static_cast<std::size_t>(next)], progress_.colors);
+        state.objects[o] = found.pose;
+        text += ", by frame " + std::to_string(next) + ": " + found.from;
+      }
+      folder_.note(text);
+    }
+  }
+
+  /// Between two frames that show it a hidden object is on a smooth path.
+  void lay_hidden_objects() {
+    std::vector<SceneState>& states = progress_.after_stage.back();
+    for (std::size_t o = 0; follows_hidden() && o < clip_.objects.size(); ++o) {
+      for (Index t = 1; t < clip_.frames(); ++t) {
+        const Index last = last_seen(t, o);
+        if (is_hidden(t, o) || last == t - 1) continue;
+        const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, states));
+        lay_between(clip_, carrier, o, static_cast<std::size_t>(last), static_cast<std::size_t>(t), states);
+      }
+    }
+  }
+
+  // ---- A frame ----
 
   /// Where the stages that draw everything begin, told in the log.
   SceneState chosen_start(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors) {
@@ -376,9 +499,6 @@ class Reconstruction {
     for (Index t = 1; t < clip_.frames(); ++t)
       hsi4d::remove_depth_bias(clip_, bias, states[static_cast<std::size_t>(t)]);
     progress_.bias = bias;
-    if (has_later()) return;  // these write the images
-    progress_.image_errors.resize(1);
-    write_results_of_frames(progress_.image_errors);
   }
 
   /// Images of all frames but the given one, and their errors.
@@ -393,7 +513,6 @@ class Reconstruction {
 
   /// The stages after the first pass, each from where the one before ended, and the images of what they leave.
   void run_later_stages() {
-    if (!has_later()) return;
     const std::size_t count = order_.later.size();
     for (std::size_t l = 0, end = 0; l < count; l = end) {
       end = l + 1;
@@ -433,14 +552,16 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     const ClipFrame frame = read_frame(clip_, index);
     std::vector<SceneState> done = progress_.later[end - 1].states;
-    for (SceneState& state : done) give_bias(state);
-    done.front() = progress_.later[l].states.front();
-    SceneState state = states_before(l)[static_cast<std::size_t>(index)];
-    give_bias(state);
+    for (std::size_t t = 1; t < done.size(); ++t) give_bias(done[t]);
+    std::vector<SceneState> biased = states_before(l);
+    for (std::size_t t = 1; t < biased.size(); ++t) give_bias(biased[t]);
+    SceneState state = biased[static_cast<std::size_t>(index)];
     progress_.colors.net = colors_after(index).net;
+    if (follows_hidden()) look_for_lost_objects(index, frame, biased, done.back(), state);
     for (std::size_t i = l; i < end; ++i) {
       run_in_frame(later_stage() + i, {index, frame, progress_.covered, done}, state, progress_.colors,
                    progress_.later[i].totals);
+      carry_hidden_objects(index, biased, state);
       progress_.later[i].states.push_back(state);
     }
     if (progress_.bias) hsi4d::remove_depth_bias(clip_, *progress_.bias, progress_.later[end - 1].states.back());
@@ -662,6 +783,15 @@ class Reconstruction {
     write_image(paths.frame_image(number, "render"), picture.image);
     write_image(paths.frame_image(number, "difference"), difference_image(picture.image, frame.target));
     errors.push_back(picture_errors(picture, frame));
+    if (follows_hidden()) note_object_ious(picture, frame, errors.size());
+  }
+
+  /// @param frames  that are written, this one included
+  void note_object_ious(const StatePicture& picture, const ClipFrame& frame, std::size_t frames) {
+    progress_.object_ious.resize(frames);
+    progress_.object_ious.back().clear();
+    for (std::size_t o = 0; o < clip_.objects.size(); ++o)
+      progress_.object_ious.back().push_back(object_iou(picture, frame, o));
   }
 
   void write_start_image(Index index, const ClipFrame& frame) {

@@ -252,6 +252,16 @@ StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>
   return result;
 }
 
+/// The planes of an image, each for itself.
+std::vector<Image> planes_of(const Image& image) {
+  std::vector<Image> planes;
+  for (int c = 0; c < image.channels(); ++c) {
+    Image& plane = planes.emplace_back(1, image.height(), image.width());
+    for (int y = 0; y < image.height(); ++y) std::copy_n(image.row(c, y), image.width(), plane.row(0, y));
+  }
+  return planes;
+}
+
 template <class S>
 StatePicture picture_in(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors,
                         bool has_silhouette) {
@@ -259,13 +269,17 @@ StatePicture picture_in(const RunConfig& config, const Clip& clip, const SceneSt
   FrameGraphSettings settings = graph_settings(config, Draw::kAll, colors);
   settings.camera_reach = 0;
   settings.human_opacity = has_silhouette;
+  settings.object_opacity = has_silhouette && config.start.objects == StartFrom::kBest;
   FrameGraph<S> graph(tape, clip, state.camera_from_world, settings);
   graph.set_state(state);
   tape.forward(graph.rendered().image);
-  StatePicture picture{to_image(tape.value(graph.rendered().image)), {}};
+  StatePicture picture{to_image(tape.value(graph.rendered().image)), {}, {}};
   if (!has_silhouette) return picture;
   tape.forward(graph.loss_inputs().human_opacity);
   picture.silhouette = to_image(tape.value(graph.loss_inputs().human_opacity));
+  if (!settings.object_opacity || clip.objects.empty()) return picture;
+  tape.forward(graph.loss_inputs().object_opacity);
+  picture.objects = planes_of(to_image(tape.value(graph.loss_inputs().object_opacity)));
   return picture;
 }
 

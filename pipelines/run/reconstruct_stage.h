@@ -73,8 +73,9 @@ std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip);
 
 /// A state as its own camera sees it.
 struct StatePicture {
-  Image image;       ///< [3,H,W]
-  Image silhouette;  ///< [1,H,W] the human's opacity
+  Image image;                 ///< [3,H,W]
+  Image silhouette;            ///< [1,H,W] the human's opacity
+  std::vector<Image> objects;  ///< [1,H,W] that of each object, where the best start is asked of them
 };
 StatePicture picture_of_state(const RunConfig& config, const Clip& clip, const SceneState& state,
                               const ColorState& colors);

@@ -7,6 +7,7 @@
 #include "optim/metrics.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/draw/view_turn.h"
+#include "pipelines/run/hidden_objects.h"
 
 namespace hsi4d {
 
@@ -91,6 +92,19 @@ void warn_of_left_ranges(const std::vector<LeftRange>& left_ranges, const RunCon
                                    : "Gaussians left out by approx.seen_within_deg may be seen") +
                      ", in ",
                  entry.frame);
+  }
+  messages.log();
+}
+
+void warn_of_lost(const std::vector<std::vector<std::optional<double>>>& ious, const Clip& clip) {
+  FramesOfMessages messages;
+  for (std::size_t t = 0; t < ious.size(); ++t) {
+    for (std::size_t o = 0; o < ious[t].size(); ++o) {
+      if (ious[t][o] && *ious[t][o] < kLostIou)
+        messages.add("the object \"" + clip.objects[o].name +
+                         "\" is lost: what is drawn has less than a fifth in common with its mask, in ",
+                     static_cast<Index>(t));
+    }
   }
   messages.log();
 }

@@ -30,6 +30,10 @@ void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig&
 /// Every stage that turned something further than a setting of `approx` allows for: one warning, with its frames.
 void warn_of_left_ranges(const std::vector<LeftRange>& left_ranges, const RunConfig& config);
 
+/// Objects of which what is drawn hardly covers what the masks show: one warning each, with the frames.
+/// @param ious  [frame][object]; none: the mask does not show it
+void warn_of_lost(const std::vector<std::vector<std::optional<double>>>& ious, const Clip& clip);
+
 /// Sees the iterations of a stage.
 class GradientWatch {
  public:

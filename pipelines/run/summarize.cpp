@@ -238,6 +238,29 @@ void add_sigmas(const Clip& clip, const std::vector<SceneState>& result, const s
   append_values(mean_errors(all), summary.metrics.back().values);
 }
 
+/// How much of the objects the frames show, and whether they are where these show them; means over the objects.
+void add_seen_objects(const RunProgress& progress, RunSummary& summary) {
+  std::vector<FrameMetrics> all;
+  for (FrameMetrics& frame : summary.per_frame) {
+    const auto t = static_cast<std::size_t>(frame.frame);
+    FrameMetrics& of_objects = all.emplace_back(FrameMetrics{frame.frame, {}});
+    if (t < progress.object_ious.size()) {
+      std::vector<FrameMetrics> ious;
+      for (const std::optional<double>& iou : progress.object_ious[t]) {
+        if (iou) ious.push_back({frame.frame, {{"object_iou", *iou}}});
+      }
+      append_values(mean_errors(ious), of_objects.values);
+    }
+    if (t < progress.seen.size()) {
+      std::vector<FrameMetrics> shares;
+      for (const double share : progress.seen[t]) shares.push_back({frame.frame, {{"object_seen_share", share}}});
+      append_values(mean_errors(shares), of_objects.values);
+    }
+    append_values(of_objects.values, frame.values);
+  }
+  append_values(mean_errors(all), summary.metrics.back().values);
+}
+
 }  // namespace
 
 FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw) {
@@ -289,6 +312,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   add_contact(config, clip, progress, summary);
   if (clip.surface) add_penetration(config, clip, progress, summary);
   add_sigmas(clip, result_of(progress), progress.sigmas, summary);
+  add_seen_objects(progress, summary);
   summary.quality = quality_of(summary.metrics.back().values, clip.frame_rate);
   return summary;
 }

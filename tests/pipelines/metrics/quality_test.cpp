@@ -15,6 +15,8 @@ TEST_CASE("a gate has a word for where its value lies, both ways round") {
   CHECK(word("silhouette_iou", 0.85) == "pass");
   CHECK(word("silhouette_iou", 0.849) == "check");
   CHECK(word("silhouette_iou", 0.69) == "fail");
+  CHECK(word("object_iou", 0.7) == "pass");
+  CHECK(word("object_iou", 0.49) == "fail");
   CHECK(word("foot_sliding_mm", 10) == "pass");
   CHECK(word("foot_sliding_mm", 10.1) == "check");
   CHECK(word("foot_sliding_mm", 26) == "fail");

@@ -148,6 +148,8 @@ TEST_CASE("every metric of the contract is known") {
                            "background_change",
                            "ssim",
                            "silhouette_iou",
+                           "object_iou",
+                           "object_seen_share",
                            "keypoints_px",
                            "keypoints_pck",
                            "floor_drift_mm",

@@ -176,6 +176,7 @@ TEST_CASE("what came after the first pass survives its checkpoint bit for bit") 
     stage.totals = {static_cast<Index>(random.below(100)), 1, 0.1, 9, 2065, 67984};
   }
   saved.bias = DepthBias{1.003, {0.999, 1}};
+  saved.seen = {{1, 1}, {0.25, 0}};
   saved.left_out = {{4, 1, 1, "center", "it is hidden"}};
   save_progress(kFile, kConfig, saved);
   const RunProgress read = load_progress(kFile, kConfig, clip, kStages, {}, 0, kOver);
@@ -188,6 +189,7 @@ TEST_CASE("what came after the first pass survives its checkpoint bit for bit") 
   }
   REQUIRE(read.bias.has_value());
   CHECK(read.bias->human == 1.003);
+  CHECK(read.seen == saved.seen);
   CHECK(read.bias->objects == std::vector<double>{0.999, 1});
   CHECK(read.left_out.size() == 1);
 }

@@ -1,0 +1,204 @@
+#include "pipelines/run/hidden_objects.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "body/kinematics.h"
+#include "core/rigid.h"
+#include "core/rotation.h"
+#include "optim/metrics.h"
+#include "optim/object_centres.h"
+#include "pipelines/graph/frame_masks.h"
+
+namespace hsi4d {
+
+namespace {
+
+using Vector = Vector3<double>;
+
+constexpr std::array<Index, 2> kWrists = {20, 21};
+constexpr Index kChest = 9;
+constexpr std::size_t kFramesOfCarrier = 8;  // that tell it
+constexpr double kHandShift = 0.01;          // metres that a hand may shift what it holds
+constexpr double kHalf = 0.5;                // of a pixel is covered
+const Vector kBehindCamera(0, 0, -1000);     // metres
+
+/// world_from_carrier.
+Rigid<double> carrier_pose(const Clip& clip, const Carrier& carrier, const SceneState& state) {
+  if (!carrier.joint) return {};
+  const PosedJoints body = pose_skeleton(clip.avatar, state.body);
+  const double* const row = body.transforms.data() + 12 * *carrier.joint;
+  Rigid<double> pose;
+  for (Index r = 0; r < 3; ++r) {
+    for (Index c = 0; c < 3; ++c) pose.rotation(r, c) = row[4 * r + c];
+    pose.translation[r] = row[4 * r + 3];
+  }
+  return pose;
+}
+
+/// Mean distance from their mean.
+double spread_of(const std::vector<Vector>& places) {
+  Vector mean = Vector::Zero();
+  for (const Vector& place : places) mean += place / static_cast<double>(places.size());
+  double sum = 0;
+  for (const Vector& place : places) sum += (place - mean).norm();
+  return sum / static_cast<double>(places.size());
+}
+
+/// How much an object's place as its carrier sees it changes, metres.
+double spread_with(const Clip& clip, const Carrier& carrier, std::size_t object,
+                   std::span<const SceneState* const> states) {
+  std::vector<Vector> places;
+  for (const SceneState* const state : states)
+    places.push_back(transform_point(inverse(carrier_pose(clip, carrier, *state)), state->objects[object].translation));
+  return spread_of(places);
+}
+
+/// The wrist that a joint of a hand belongs to; none: it is no hand's.
+std::optional<Index> wrist_of(const Clip& clip, Index joint) {
+  while (joint >= 0) {
+    if (std::find(kWrists.begin(), kWrists.end(), joint) != kWrists.end()) return joint;
+    joint = clip.avatar.parents[static_cast<std::size_t>(joint)];
+  }
+  return {};
+}
+
+bool is_touched(const Clip& clip, std::size_t object, Index wrist, const SceneState& state) {
+  const ObjectCentres centres({&clip.objects[object].gaussians});
+  const std::array<Rigid<double>, 1> pose = {rigid_of(state.objects[object])};
+  const std::vector<double> joints = pose_joints(clip.avatar, state.body);
+  for (Index j = 0; 3 * j < std::ssize(joints); ++j) {
+    if (wrist_of(clip, j) == wrist && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance))
+      return true;
+  }
+  return false;
+}
+
+double image_difference(const RunConfig& config, const Clip& clip, const SceneState& state, const ClipFrame& frame,
+                        const ColorState& colors) {
+  const Image image = render_state(config, clip, state, colors);
+  double sum = 0;
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x)
+        sum += std::fabs(static_cast<double>(image(c, y, x) - frame.target(c, y, x)));
+    }
+  }
+  return sum;
+}
+
+/// The same depth, where the middle of the mask is in the image.
+ObjectPose at_mask(const Camera& camera, const Vector& center, ObjectPose pose) {
+  Vector place = transform_point(camera.camera_from_world, pose.translation);
+  place[0] = (center[0] - camera.cx) / camera.fx * place[2];
+  place[1] = (center[1] - camera.cy) / camera.fy * place[2];
+  pose.translation = transform_point(inverse(camera.camera_from_world), place);
+  return pose;
+}
+
+}  // namespace
+
+std::string carrier_text(const Carrier& carrier) {
+  return carrier.joint ? "stays with the chest" : "stays where it was";
+}
+
+std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double mask_threshold,
+                                const SceneState& state) {
+  Camera camera = clip.camera;
+  camera.camera_from_world = state.camera_from_world;
+  std::vector<double> shares(clip.objects.size(), 1.0);
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    if (o >= frame.object_masks.size() || frame.object_masks[o].empty()) continue;
+    const double pixels = mask_center(frame.object_masks[o], mask_threshold)[2];
+    const double all = covered_area(clip.objects[o].gaussians, state.objects[o], camera);
+    shares[o] = pixels < all ? pixels / all : pixels > 0 ? 1.0 : 0.0;
+  }
+  return shares;
+}
+
+double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t object, const SceneState& state) {
+  Camera camera = clip.camera;
+  camera.camera_from_world = state.camera_from_world;
+  const double pixels = mask_center(picture.objects.at(object), 0)[2];
+  const double all = covered_area(clip.objects[object].gaussians, state.objects[object], camera);
+  return pixels < all ? pixels / all : pixels > 0 ? 1.0 : 0.0;
+}
+
+Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen) {
+  const std::span<const SceneState* const> last = std::span(seen).last(std::min(kFramesOfCarrier, seen.size()));
+  const bool is_held = std::any_of(kWrists.begin(), kWrists.end(),
+                                   [&](Index wrist) { return is_touched(clip, object, wrist, *last.back()); });
+  const Carrier person{kChest};
+  if (is_held && spread_with(clip, person, object, last) < spread_with(clip, {}, object, last) + kHandShift)
+    return person;
+  return {};
+}
+
+ObjectPose carried_pose(const Clip& clip, const Carrier& carrier, std::size_t object, const SceneState& from,
+                        const SceneState& to) {
+  if (!carrier.joint) return from.objects[object];
+  const Rigid<double> to_from_from =
+      compose(carrier_pose(clip, carrier, to), inverse(carrier_pose(clip, carrier, from)));
+  return pose_of(compose(to_from_from, rigid_of(from.objects[object])));
+}
+
+void lay_between(const Clip& clip, const Carrier& carrier, std::size_t object, std::size_t begin, std::size_t end,
+                 std::vector<SceneState>& states) {
+  const auto as_seen = [&](std::size_t t) {
+    return compose(inverse(carrier_pose(clip, carrier, states[t])), rigid_of(states[t].objects[object]));
+  };
+  const Rigid<double> from = as_seen(begin), to = as_seen(end);
+  const Vector turn = so3_log(Matrix3<double>(from.rotation.transpose() * to.rotation));
+  for (std::size_t t = begin + 1; t < end; ++t) {
+    const double share = static_cast<double>(t - begin) / static_cast<double>(end - begin);
+    Rigid<double> between;
+    between.rotation = from.rotation * so3_exp(Vector(share * turn));
+    between.translation = (1 - share) * from.translation + share * to.translation;
+    states[t].objects[object] = pose_of(compose(carrier_pose(clip, carrier, states[t]), between));
+  }
+}
+
+std::optional<double> object_iou(const StatePicture& picture, const ClipFrame& frame, std::size_t object) {
+  constexpr double kSliver = 1.0 / 4096;  // of the picture
+  if (object >= picture.objects.size() || object >= frame.object_masks.size() || frame.object_masks[object].empty())
+    return {};
+  const Image& mask = frame.object_masks[object];
+  if (mask_center(mask, kHalf)[2] < kSliver * mask.width() * mask.height()) return {};
+  return mask_iou(picture.objects.at(object), mask);
+}
+
+bool is_shown_at(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
+                 const SceneState& state, const ColorState& colors) {
+  SceneState without = state;
+  without.objects[object].translation = transform_point(inverse(state.camera_from_world), kBehindCamera);
+  return image_difference(config, clip, state, frame, colors) < image_difference(config, clip, without, frame, colors);
+}
+
+FoundObject find_object(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
+                        const SceneState& state, const SceneState& last, const ColorState& colors) {
+  Camera camera = clip.camera;
+  camera.camera_from_world = state.camera_from_world;
+  FoundObject best;
+  double least = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const ObjectPose& pose, const std::string& from) {
+    SceneState tried = state;
+    tried.objects[object] = pose;
+    const double difference = image_difference(config, clip, tried, frame, colors);
+    if (!(difference < least)) return;
+    least = difference;
+    best = {pose, from};
+  };
+  const Vector center = mask_center(frame.object_masks.at(object), config.data.mask_threshold);
+  consider(state.objects[object], "as expected");
+  consider(last.objects[object], "where it was");
+  if (center[2] > 0) {
+    consider(at_mask(camera, center, state.objects[object]), "as expected, at its mask");
+    consider(at_mask(camera, center, last.objects[object]), "where it was, at its mask");
+  }
+  return best;
+}
+
+}  // namespace hsi4d
