@@ -19,8 +19,7 @@ def pairs(points, low, high, cell, at_once=500_000):
     origin = points.min(0)
     at = np.floor((points - origin) / cell).astype(np.int64)
     shape = at.max(0) + 1
-    with np.errstate(invalid="ignore"):
-        first, last = np.floor((low - origin) / cell), np.floor((high - origin) / cell)
+    first, last = np.floor((low - origin) / cell), np.floor((high - origin) / cell)
     boxes = np.flatnonzero(((last >= 0) & (first < shape)).all(1))
     first = np.maximum(first[boxes], 0).astype(np.int64)
     sizes = np.minimum(last[boxes], shape - 1).astype(np.int64) - first + 1
