@@ -125,6 +125,12 @@ def in_camera(points, camera):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def eye_of(camera):
+    """[3] where a camera is."""
+    matrix = np.asarray(camera["world_to_camera"], float)
+    return -matrix[:3, :3].T @ matrix[:3, 3]
+
+
 def projected(points, camera):
     """[...,2] pixels of points in the camera's axes."""
     return points[..., :2] / points[..., 2:] * (camera["fx"], camera["fy"]) + (camera["cx"], camera["cy"])
@@ -143,8 +149,7 @@ def seen_by(camera, points, normals, triangles):
     are small beside the room before the camera (split): those that reach behind it are passed over."""
     slack = 0.001  # metres: what is so near before a point does not hide it
     local = in_camera(points, camera)
-    eye = -np.asarray(camera["world_to_camera"], float)[:3, :3].T @ np.asarray(camera["world_to_camera"], float)[:3, 3]
-    seen = (local[:, 2] > NEAREST) & (((eye - points) * normals).sum(1) > 0)
+    seen = (local[:, 2] > NEAREST) & (((eye_of(camera) - points) * normals).sum(1) > 0)
     at = projected(np.where(seen[:, None], local, 1), camera)
     seen &= (at >= 0).all(1) & (at < (camera["width"], camera["height"])).all(1)
     kept = np.flatnonzero(seen)
