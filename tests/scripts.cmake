@@ -65,6 +65,9 @@ if(HSI4D_PYTHON3)
   set_tests_properties("what the front end says of wrong input" PROPERTIES LABELS quick)
   set_tests_properties("exporters of VPoser, WHAM, GVHMR, TRAM and WHAC" "services for video, masks and poses" "embeddings by CLIP"
                        "masks by SAM 2" "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+  add_test(NAME "measures of meshes, and meshes with truth"
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/mesh_measures_test.py ${PROJECT_SOURCE_DIR}/tools)
+  set_tests_properties("measures of meshes, and meshes with truth" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
   add_test(NAME "links between pages"
            COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/links_test.py ${PROJECT_SOURCE_DIR})
   set_tests_properties("links between pages" PROPERTIES LABELS quick)
