@@ -423,7 +423,7 @@ void add_joint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   }
 }
 
-/// Stages over the sequence that no prior holds. Shipped configs are meant so: that is no reason to warn.
+/// Stages over the sequence that no prior holds. Shipped configs are meant so: it disturbs on a terminal.
 void add_prior_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   for (const auto& [name, stage] : config.stages) {
     const ParameterGroupSettings* const latents = find_entry(stage.optimize, kPoseLatents);
@@ -433,8 +433,8 @@ void add_prior_notes(const RunConfig& config, std::vector<RunNote>& notes) {
     };
     if (latents == nullptr || latents->lr == 0 || !stage.pose_weights.empty()) continue;
     if (holds("pose_prior") || holds("joint_limits")) continue;
-    notes.push_back({LogLevel::kInfo, "stages." + name + ": without pose_weights its " + kPoseLatents +
-                                          " stand for poses one to one, and no prior holds the body"});
+    notes.push_back({LogLevel::kDebug, "stages." + name + ": without pose_weights its " + kPoseLatents +
+                                           " stand for poses one to one, and no prior holds the body"});
   }
 }
 

@@ -40,6 +40,8 @@ void on_threads(int threads, F&& body) {
 /// What is logged before a run has its folder; it belongs into that folder's log too.
 class EarlyMessages {
  public:
+  /// What belongs into the log and would disturb on a terminal.
+  void keep(std::string message) { messages_.emplace_back(LogLevel::kInfo, std::move(message)); }
   void move_to(const RunFolder& folder) {
     sink_.reset();
     for (const auto& [level, message] : messages_) folder.note(message, level);
@@ -223,7 +225,12 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   RunConfig config = asked;
   prepare_run(config);
   EarlyMessages early;
-  for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
+  for (const RunNote& note : run_notes(config)) {
+    if (note.level < LogLevel::kInfo)
+      early.keep(note.text);
+    else
+      log_message(note.level, note.text);
+  }
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));  // without what programs outside make
   const int threads = options.threads > 0 ? options.threads : config.threads;

@@ -487,16 +487,16 @@ def bodies():
                              ("weights: holds no numbers", {"weights": "many"}),
                              ("has 23 joints", {"kintree_table": np.zeros((2, 23), np.int64)})):
         save("bad.pkl", {**good, **change})
-        refused(expected, "export_body.py", "bad.pkl", "bad.npz")
+        refused(expected, "export_body.py", "bad.pkl", "refused.npz")
     save("bad.pkl", {name: array for name, array in good.items() if name != "f"})
-    refused("bad.pkl: has no f", "export_body.py", "bad.pkl", "bad.npz")
+    refused("bad.pkl: has no f", "export_body.py", "bad.pkl", "refused.npz")
     save("bad.pkl", [1])
-    refused("is no table of arrays", "export_body.py", "bad.pkl", "bad.npz")
+    refused("is no table of arrays", "export_body.py", "bad.pkl", "refused.npz")
     pathlib.Path("bad.pkl").write_bytes(b"no pickle")
-    refused("is no pickle of a body model", "export_body.py", "bad.pkl", "bad.npz")
-    refused("No such file", "export_body.py", "nowhere.pkl", "bad.npz")
+    refused("is no pickle of a body model", "export_body.py", "bad.pkl", "refused.npz")
+    refused("No such file", "export_body.py", "nowhere.pkl", "refused.npz")
     refused("allowed: a name that ends in .npz", "export_body.py", "smpl.pkl", "b.pkl")
-    assert not pathlib.Path("bad.npz").exists()
+    assert not pathlib.Path("refused.npz").exists()
 
 
 folder = tempfile.TemporaryDirectory()

@@ -269,12 +269,11 @@ TEST_CASE("a stage over the sequence that leaves the body where it was is told",
 TEST_CASE("a stage over the sequence that no prior holds is noted once, and not warned of", "[run][sequence]") {
   const auto notes = [](const RunConfig& config) {
     std::string text;
-    for (const RunNote& note : run_notes(config))
-      text += std::string(log_level_name(note.level)) + " " + note.text + "\n";
+    for (const RunNote& note : run_notes(config)) text += note.text + "\n";
     return text;
   };
   const std::string told =
-      "info stages.refinement: without pose_weights its pose_latents stand for poses one to one, and no prior holds "
+      "stages.refinement: without pose_weights its pose_latents stand for poses one to one, and no prior holds "
       "the body\n";
   CHECK(notes(refined_config()) == told);
   CHECK(notes(refined_config({"stages.refinement.optimize.pose_latents.lr=0"})).empty());
