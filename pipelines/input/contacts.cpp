@@ -1,9 +1,7 @@
 #include "pipelines/input/contacts.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
 
 #include "body/pose_layout.h"
 #include "core/check.h"
