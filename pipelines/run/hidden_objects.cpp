@@ -99,6 +99,14 @@ ObjectPose at_mask(const Camera& camera, const Vector& center, ObjectPose pose) 
   return pose;
 }
 
+/// @param pixels  of the object that show
+double shown_share(const Clip& clip, double pixels, std::size_t object, const SceneState& state) {
+  Camera camera = clip.camera;
+  camera.camera_from_world = state.camera_from_world;
+  const double all = covered_area(clip.objects[object].gaussians, state.objects[object], camera);
+  return pixels < all ? pixels / all : pixels > 0 ? 1.0 : 0.0;
+}
+
 }  // namespace
 
 std::string carrier_text(const Carrier& carrier) {
@@ -107,24 +115,16 @@ std::string carrier_text(const Carrier& carrier) {
 
 std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double mask_threshold,
                                 const SceneState& state) {
-  Camera camera = clip.camera;
-  camera.camera_from_world = state.camera_from_world;
   std::vector<double> shares(clip.objects.size(), 1.0);
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     if (o >= frame.object_masks.size() || frame.object_masks[o].empty()) continue;
-    const double pixels = mask_center(frame.object_masks[o], mask_threshold)[2];
-    const double all = covered_area(clip.objects[o].gaussians, state.objects[o], camera);
-    shares[o] = pixels < all ? pixels / all : pixels > 0 ? 1.0 : 0.0;
+    shares[o] = shown_share(clip, mask_center(frame.object_masks[o], mask_threshold)[2], o, state);
   }
   return shares;
 }
 
 double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t object, const SceneState& state) {
-  Camera camera = clip.camera;
-  camera.camera_from_world = state.camera_from_world;
-  const double pixels = mask_center(picture.objects.at(object), 0)[2];
-  const double all = covered_area(clip.objects[object].gaussians, state.objects[object], camera);
-  return pixels < all ? pixels / all : pixels > 0 ? 1.0 : 0.0;
+  return shown_share(clip, mask_center(picture.objects.at(object), 0)[2], object, state);
 }
 
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen) {
