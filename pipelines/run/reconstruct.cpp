@@ -348,8 +348,10 @@ class Reconstruction {
 
   std::vector<double> all_seen() const { return std::vector(clip_.objects.size(), 1.0); }
 
+  /// Objects on joints stay on these, whatever shows of them.
   bool is_hidden(Index frame, std::size_t object) const {
-    return frame < std::ssize(progress_.seen) && progress_.seen[static_cast<std::size_t>(frame)][object] < kHiddenBelow;
+    return !clip_.objects[object].joint && frame < std::ssize(progress_.seen) &&
+           progress_.seen[static_cast<std::size_t>(frame)][object] < kHiddenBelow;
   }
 
   /// Notes what the frame shows of the objects, lets those that it hides go with their carriers, and looks for those
@@ -416,7 +418,7 @@ class Reconstruction {
     const StatePicture picture = picture_of_state(config_, clip_, state, progress_.colors);
     for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
       const std::optional<double> iou = object_iou(picture, frame, o);
-      if (is_hidden(index, o) || !iou || *iou >= kDoubtfulIou) continue;
+      if (clip_.objects[o].joint || is_hidden(index, o) || !iou || *iou >= kDoubtfulIou) continue;
       FoundObject found = find_object(config_, clip_, o, frame, state, before, progress_.colors);
       state.objects[o] = found.pose;
       std::string text = "frame " + std::to_string(index) + ", pass " + std::to_string(pass_) + ": " +

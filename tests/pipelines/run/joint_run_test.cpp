@@ -121,6 +121,23 @@ TEST_CASE("a run on a joint is another run with another joint, and starts on it"
   }
 }
 
+TEST_CASE("an object on a joint stays on it where a frame hides it", "[run]") {
+  const GateClip gate;
+  Image sliver(1, 96, 96);
+  for (int x = 40; x < 44; ++x) sliver(0, 50, x) = 1;
+  write_image((gate.path / "masks/gate/0002.png").string(), sliver);
+  const fs::path run = gate.folder.path() / "run";
+  execute_tiny(gate.config({"start.objects=best"}), run.string());
+  const Clip clip = read_clip(gate.config().data);
+  const ObjectJoint& joint = *clip.objects[0].joint;
+  for (const auto& frame : read_object_tracks((run / "objects.npz").string(), {"gate"})) {
+    const Rigid<double> pose = rigid_of(frame[0]), on = on_joint(joint, joint_value(joint, pose));
+    CHECK((on.translation - pose.translation).norm() < 1e-9);
+    CHECK((on.rotation - pose.rotation).norm() < 1e-9);
+  }
+  CHECK_THAT(file_text(run / "log.txt"), !Contains("gate is hidden"));
+}
+
 TEST_CASE("what is wrong with joints is named", "[run]") {
   const GateClip gate;
   const auto fault = [&gate](const std::vector<std::string>& overrides) {
