@@ -309,7 +309,7 @@ TEST_CASE("every scene with motion and object makes a dataset") {
 TEST_CASE("every shipped config of synth makes its dataset") {
   const TemporaryFolder folder;
   CHECK(made_of_configs("synthetic") == std::vector<std::string>{"alone", "chain", "disturbed", "faults", "full_size",
-                                                                 "gate", "hidden", "table", "walk"});
+                                                                 "gate", "hidden", "table", "two_people", "walk"});
 }
 
 TEST_CASE("every shipped clip of the accuracy table makes its dataset", "[release]") {
