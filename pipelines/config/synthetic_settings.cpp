@@ -130,7 +130,8 @@ void describe(ConfigFields& f, SyntheticPerson& s) {
             "x, y from where the first person acts to where this one does, metres");
   f.number("turn_deg", s.turn_deg, {.min = -360, .max = 360}, "Turns what it does about z, degrees");
   f.number("begin", s.begin, {.min = 0, .max = 1e4}, "Seconds of what it does that are over in frame 0");
-  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Added to the seed of the dataset, for its Gaussians, its clothes and its noise");
+  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
+            "Added to the seed of the dataset, for its Gaussians, its clothes and its noise");
 }
 
 void describe(ConfigFields& f, SyntheticLight& s) {
