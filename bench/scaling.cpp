@@ -154,7 +154,7 @@ class Measured {
       const StageSettings& stage = config_.stages[s].second;
       if (stage.over == StageScope::kSequence) continue;
       SceneState state = stage.draw == Draw::kAll ? filmed.start : filmed.clip.first;
-      ColorState colors = first_color_state(first_color_net(config_.color_net, filmed.clip.avatar, config_.seed));
+      ColorState colors = first_color_state(first_nets(config_, filmed.clip));
       run_frame_stage({config_, filmed.clip, losses, s}, {1, filmed.frame, covered, {&filmed.clip.first, 1}}, state,
                       colors, [this, s](const auto& report, const auto& counters) { told_[s].hear(report, counters); });
     }

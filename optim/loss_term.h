@@ -95,6 +95,12 @@ struct LossInputs {
   Var<S> color_change;  ///< [N,3] by how much the avatar's own colours are others than where a fit of it began
   Var<S> shape_change;  ///< [N,7] likewise places, cm, log-scales and logits of the opacity
 
+  /// Those of the people beside the first one: of each the human_… inputs, keypoints and bones, those over the body,
+  /// object_masks, and nothing else. A term's value is the sum of what it is of the first person with all else, and of
+  /// each of these.
+  std::vector<LossInputs> others;
+  bool is_of_other = false;  ///< of such a person: terms of objects alone have no value
+
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
   std::vector<LossNote>* notes = nullptr;    ///< where it tells what it found; null: nobody asks
 

@@ -25,6 +25,19 @@ std::any prepared_of(const LossSettings& chosen, const LossTerm& term) {
   return prepared_loss(term.description.prepare, chosen.own.has_value() ? chosen.own : term.description.defaults);
 }
 
+/// The term of the first person and all else, and of each other person.
+template <class S>
+Var<S> record_term(const LossTerm& term, const LossInputs<S>& inputs, const std::any& prepared) {
+  Var<S> sum = term.record(inputs, prepared);
+  if (!term.description.needs) return sum;  // of images
+  for (LossInputs<S> other : inputs.others) {
+    other.left_out = inputs.left_out;
+    const Var<S> value = term.record(other, prepared);
+    if (value.tape != nullptr) sum = sum.tape == nullptr ? value : sum + value;
+  }
+  return sum;
+}
+
 }  // namespace
 
 std::string stage_message(const std::string& stage, const std::string& text) {
@@ -54,7 +67,7 @@ RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossT
   std::vector<std::string> reasons;
   for (const auto& [name, chosen] : settings.losses) {
     const LossTerm& term = term_named(name, terms, stage);
-    const Var<S> value = chosen.weight == 0 ? Var<S>{} : term.record(asking, prepared_of(chosen, term));
+    const Var<S> value = chosen.weight == 0 ? Var<S>{} : record_term(term, asking, prepared_of(chosen, term));
     if (value.tape == nullptr) {
       loss.off.push_back(name);
       reasons.push_back(name + (chosen.weight == 0 ? " has weight 0" : " lacks an input"));

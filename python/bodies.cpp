@@ -139,10 +139,12 @@ void add_avatar_array(py::class_<Avatar>& type, const char* name, Type member, p
 
 // --- states ----------------------------------------------------------------------------------------------------------
 
-SceneState state_of(py::handle camera_from_world, const BodyPose& body, const py::sequence& objects) {
+SceneState state_of(py::handle camera_from_world, const BodyPose& body, const py::sequence& objects,
+                    const std::vector<BodyPose>& others) {
   SceneState state;
   state.camera_from_world = rigid_of(camera_from_world, "camera_from_world");
   state.body = body;
+  state.others = others;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const py::object pose = objects[i];
     const std::string name = "objects[" + std::to_string(i) + "]";
@@ -201,15 +203,19 @@ void add_poses(py::module_& module) {
         return rest_pose(joints);
       },
       py::arg("joints") = kSmplxJoints, "The rest pose of a body of so many joints, at its origin.");
-  py::class_<SceneState>(module, "State", "All that moves, in one frame: camera, objects and body.")
-      .def(py::init(&state_of), py::arg("camera_from_world"), py::arg("body"), py::arg("objects") = py::tuple())
+  py::class_<SceneState>(module, "State", "All that moves, in one frame: camera, objects and bodies.")
+      .def(py::init(&state_of), py::arg("camera_from_world"), py::arg("body"), py::arg("objects") = py::tuple(),
+           py::arg("others") = std::vector<BodyPose>())
       .def_property_readonly(
           "camera_from_world", [](const SceneState& state) { return array_of(state.camera_from_world); },
           "[4,4] metres. A copy.")
       .def_property_readonly("objects", &object_pairs,
                              "Pairs of rotation [3], axis-angle, and translation [3], metres, in the clip's order.")
       .def_property_readonly(
-          "body", [](const SceneState& state) { return state.body; }, "The body's pose.");
+          "body", [](const SceneState& state) { return state.body; }, "The body's pose.")
+      .def_property_readonly(
+          "others", [](const SceneState& state) { return state.others; },
+          "Poses of the people beside the first one, in the clip's order.");
 }
 
 void add_motions(py::module_& module) {

@@ -142,7 +142,11 @@ def rest_pose(joints: int = 55) -> BodyPose: ...
 
 class State:
     def __init__(
-        self, camera_from_world: ArrayLike, body: BodyPose, objects: Sequence[tuple[ArrayLike, ArrayLike]] = ()
+        self,
+        camera_from_world: ArrayLike,
+        body: BodyPose,
+        objects: Sequence[tuple[ArrayLike, ArrayLike]] = (),
+        others: Sequence[BodyPose] = (),
     ) -> None: ...
     @property
     def camera_from_world(self) -> _Doubles: ...
@@ -150,6 +154,8 @@ class State:
     def objects(self) -> list[tuple[_Doubles, _Doubles]]: ...
     @property
     def body(self) -> BodyPose: ...
+    @property
+    def others(self) -> list[BodyPose]: ...
 
 class Motion:
     def __init__(

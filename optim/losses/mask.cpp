@@ -1,4 +1,4 @@
-// L = Σ over the human and the O objects of v · mean over the pixels of ρ((m̂ − m)²), / (1 + O): m̂ the rendered opacity
+// L = Σ over the people and the O objects of v · mean over the pixels of ρ((m̂ − m)²), / (1 + O): m̂ the rendered opacity
 // Σ T α, occluders included, m the mask of the frame, v 1, or 0 where that shows nothing: a mask that is missing, or of
 // something out of sight, says nothing about the place.   ρ: squared d²; huber and geman_mcclure of robust.h.
 #include "autodiff/difference.h"
@@ -83,9 +83,10 @@ LossTerm mask_loss() {
                             objects =
                                 silhouettes(in, in.object_opacity, in.object_masks, in.object_seen, false, settings);
                           if (human.tape == nullptr) return objects;
-                          if (objects.tape == nullptr) return human;
+                          if (!settings.objects || !in.given(in.object_masks)) return human;
                           const auto count = static_cast<double>(in.object_masks.shape().planes);
-                          return human * (1 / (1 + count)) + objects * (count / (1 + count));
+                          human = human * (1 / (1 + count));
+                          return objects.tape == nullptr ? human : human + objects * (count / (1 + count));
                         }));
 }
 

@@ -70,6 +70,7 @@ Var<S> standing_places(Tape<S>& tape, const MotionStart& motion, const std::vect
 
 template <class S>
 Var<S> object_smooth(const LossInputs<S>& in, const ObjectSmoothSettings& settings) {
+  if (in.is_of_other) return {};
   const MotionStart& motion = *in.motion;
   // Differences between frames that stand say nothing.
   const Index first = std::max<Index>(0, motion.still_frames - settings.order);

@@ -112,6 +112,8 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
   for (const ClipObject& object : clip.objects) {
     text += "  object " + object.name + " of " + count_text(object.gaussians.count(), "Gaussian") + "\n";
   }
+  for (const ClipPerson& person : clip.others)
+    text += "  person " + person.name + " of " + count_text(person.avatar.count(), "Gaussian") + "\n";
   return text + stages_text(config);
 }
 

@@ -27,9 +27,30 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
     if (has_splat_ending(entry.path().string()) && !is_hidden(entry.path().string()))
       data.objects.push_back({entry.path().stem().string(), {.gaussians = entry.path()}});
   }
-  std::sort(data.objects.begin(), data.objects.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const fs::directory_entry& entry : fs::directory_iterator(base / "people", error)) {
+    const fs::path avatar = entry.path() / "avatar.safetensors";
+    if (fs::exists(avatar))
+      data.people.push_back(
+          {entry.path().filename().string(), {.avatar = avatar, .initial = entry.path() / "initial.json"}});
+  }
+  const auto by_name = [](const auto& a, const auto& b) { return a.first < b.first; };
+  std::sort(data.objects.begin(), data.objects.end(), by_name);
+  std::sort(data.people.begin(), data.people.end(), by_name);
   return data;
 }
+
+DataSettings data_of_person(const DataSettings& data, const PersonSettings& person) {
+  DataSettings own = data;
+  own.objects.clear();
+  own.people.clear();
+  own.avatar = person.avatar;
+  own.initial = person.initial;
+  own.motion = person.motion;
+  own.keypoints = person.keypoints;
+  return own;
+}
+
+std::string motion_file_of(const std::string& person) { return "motion_of_" + person + ".npz"; }
 
 bool has_hint(const ObjectSettings& object) {
   return !object.first_mask.empty() || !object.first_box.empty() || !object.first_clicks.empty();
@@ -110,6 +131,13 @@ void describe(ConfigFields& f, ObjectSettings& s) {
   f.object("joint", s.joint, "What it hangs on, if it does not move freely");
 }
 
+void describe(ConfigFields& f, PersonSettings& s) {
+  f.path("avatar", s.avatar, {.must_exist = true}, "As data.avatar").required();
+  f.path("initial", s.initial, {.must_exist = true}, "As data.initial, of a person alone").required();
+  f.path("motion", s.motion, {.must_exist = true}, "As data.motion");
+  f.path("keypoints", s.keypoints, {.must_exist = true}, "As data.keypoints, of the same points");
+}
+
 void describe(ConfigFields& f, LensSettings& s) {
   constexpr double kMost = 10;
   f.number("k1", s.lens.k1, {.min = -kMost, .max = kMost}, "Radial, of the squared radius at depth 1");
@@ -125,11 +153,15 @@ void describe(ConfigFields& f, DataSettings& s) {
          "The static scene (" + joined(splat_endings(), " or ") + "), metres, z up");
   f.map("objects", s.objects, "Rigid objects that move, by name");
   f.rule({"objects"}, [&s] { return parent_problem(s.objects); });
+  f.map("people", s.people,
+        "People beside the one whose avatar, initial, motion and keypoints stand here, by name: it names the folder of "
+        "their masks, beside human/");
   f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
   f.path("frames", s.frames, {.must_exist = true},
          "Video file, or folder of .png files sorted by name; as large as the camera's image or larger");
   f.path("masks", s.masks, {.must_exist = true},
-         "Folder with human/ and one folder per object, grey .png files named as the frames; or human.mp4 and so on");
+         "Folder with human/, one folder per object and per further person, grey .png files named as the frames; or "
+         "human.mp4 and so on");
   f.number("video_rate", s.video_rate, {.min = 0, .max = 1e4}, "Frames per second of the video; 0: as its file says");
   f.number("frame_rate", s.frame_rate, {.min = 0, .max = 1e4},
            "Frames per second that are kept; estimated poses are resampled; 0: all");

@@ -44,6 +44,11 @@ enum class MotionAlign { kHeading, kRotation, kNone };
 inline constexpr std::array<ConfigChoice<MotionAlign>, 3> kMotionAligns = {
     {{MotionAlign::kHeading, "heading"}, {MotionAlign::kRotation, "rotation"}, {MotionAlign::kNone, "none"}}};
 
+/// A person beside the first one, whose files `data` itself names.
+struct PersonSettings {
+  std::filesystem::path avatar, initial, motion{}, keypoints{};  ///< as in DataSettings
+};
+
 /// How the lens of the video bends.
 struct LensSettings {
   Lens lens;
@@ -54,6 +59,7 @@ struct LensSettings {
 struct DataSettings {
   std::filesystem::path scene;
   ConfigMap<ObjectSettings> objects;  ///< by name
+  ConfigMap<PersonSettings> people;   ///< beside the first one, by name
   std::filesystem::path avatar;
   std::filesystem::path frames;
   std::filesystem::path masks;
@@ -76,17 +82,25 @@ struct DataSettings {
   int mask_margin_px = 1;
 };
 
+/// The inputs as they would be with one of data.people for the first person, without objects and other people.
+DataSettings data_of_person(const DataSettings& data, const PersonSettings& person);
+
+/// The motion of a person beside the first one, in a folder of truth or results: "motion_of_NAME.npz".
+std::string motion_file_of(const std::string& person);
+
 /// The video of a dataset, where it is one file.
 inline constexpr const char* kDatasetVideo = "video.mp4";
 
 /// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.safetensors,
-/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, truth/ and
-/// truth/surface.ply (none where they are missing), and keypoints.json where that has been added. Paths are absolute.
+/// people/NAME/ with the avatar.safetensors and initial.json of people beside the first one, video.mp4 (or frames/
+/// where there is none), masks/, camera.json, initial.json, truth/ and truth/surface.ply (none where they are missing),
+/// and keypoints.json where that has been added. Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, JointSettings& settings);
 void describe(ConfigFields& fields, ObjectSettings& settings);
+void describe(ConfigFields& fields, PersonSettings& settings);
 void describe(ConfigFields& fields, LensSettings& settings);
 void describe(ConfigFields& fields, DataSettings& settings);
 

@@ -25,6 +25,7 @@ void take_instance_data(const InstanceSettings& instance, DataSettings& data) {
         &DataSettings::initial, &DataSettings::keypoints, &DataSettings::truth, &DataSettings::surface})
     if ((data.*file).empty()) data.*file = found.*file;
   if (data.objects.empty()) data.objects = std::move(found.objects);
+  if (data.people.empty()) data.people = std::move(found.people);
 }
 
 }  // namespace hsi4d

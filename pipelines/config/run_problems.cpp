@@ -147,6 +147,41 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
   }
 }
 
+/// People beside the first one are named as folders of masks and files of results are.
+void add_people_name_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+  for (const auto& [name, person] : data.people) {
+    const std::string place = child_pointer("/data/people", name);
+    if (name == kHumanMasks)
+      found.push_back({place, json_string(name) + " is the first person, whom /data names; use another name", {}});
+    if (find_entry(data.objects, name) != nullptr)
+      found.push_back({place, json_string(name) + " is the name of an object too, whose masks have that folder", {}});
+  }
+}
+
+/// What knows of one person alone.
+void add_people_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  const std::string people = "/data/people";
+  for (std::size_t i = 0; i < config.chain.size(); ++i) {
+    const std::string of_clip = "/chain/" + std::to_string(i) + people;
+    if (!config.chain[i].data.people.empty())
+      found.push_back({of_clip, "a chain knows one person; run its clips one by one", {of_clip, people, "/chain"}});
+  }
+  if (config.data.people.empty()) return;
+  const auto refuse = [&](const std::string& place, const std::string& text) {
+    found.push_back({place, text + ", and /data/people names more", {place, people}});
+  };
+  add_people_name_problems(config.data, found);
+  if (config.uncertainty) refuse("/uncertainty", "is told of one person; allowed: false");
+  if (!config.data.tracks.empty()) refuse("/data/tracks", "points are followed on one person; leave them out");
+  if (has_sources(config.sources)) refuse("/sources", "programs know one person; give what they would make in /data");
+  for (const auto& [name, stage] : config.stages) {
+    const std::string place = child_pointer("/stages", name);
+    if (find_entry(stage.optimize, kBetasGroup) != nullptr)
+      refuse(child_pointer(place + "/optimize", kBetasGroup), "are of one person; leave the group out");
+    if (stage.headings > 1) refuse(place + "/headings", "are tried of one person; allowed: 1");
+  }
+}
+
 /// Of the run, or of all clips of a chain, which may have one list of joints in common.
 void add_keypoint_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   const auto has_keypoints = [](const ChainClip& clip) { return !clip.data.keypoints.empty(); };
@@ -586,6 +621,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_unknown_problems(config, found);
   add_joint_problems(config, found);
   add_lens_problems(config.data, found);
+  add_people_problems(config, found);
   add_given_frame_problems(config, found);
   if (config.uncertainty && !config.stages.empty() && !stage_of_sigmas(config))
     found.push_back({"/uncertainty",

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/text.h"
+#include "pipelines/config/masks.h"
 #include "pipelines/config/synthetic_places.h"
 #include "splat/files/splat_file.h"
 
@@ -111,6 +112,28 @@ std::string object_names_of(SyntheticMotionKind motion) {
   return joined(names);
 }
 
+namespace {
+
+bool is_of_further_person(SyntheticMotionKind motion) {
+  return motion == SyntheticMotionKind::kWalk || motion == SyntheticMotionKind::kWave ||
+         motion == SyntheticMotionKind::kLean;
+}
+
+}  // namespace
+
+void describe(ConfigFields& f, SyntheticPerson& s) {
+  f.choice("motion", s.motion, kSyntheticMotionKinds, "What the person does: walk, wave or lean");
+  f.rule({"motion"}, [&s]() -> std::string {
+    return is_of_further_person(s.motion) ? "" : "needs an object or a place; allowed: walk, wave, lean";
+  });
+  f.numbers("beside", s.beside, {.min = -100, .max = 100},
+            "x, y from where the first person acts to where this one does, metres");
+  f.number("turn_deg", s.turn_deg, {.min = -360, .max = 360}, "Turns what it does about z, degrees");
+  f.number("begin", s.begin, {.min = 0, .max = 1e4}, "Seconds of what it does that are over in frame 0");
+  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
+            "Added to the seed of the dataset, for its Gaussians, its clothes and its noise");
+}
+
 void describe(ConfigFields& f, SyntheticLight& s) {
   f.number("shading", s.shading, {.min = 0, .max = 1},
            "How much darker human and object are where they face away from the light");
@@ -169,6 +192,16 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
   });
   f.string("place", s.place, "Place of a motion that needs one; empty: the first. `hsi4d list scenes` names them");
   f.rule({"place", "motion", "scene"}, [&s] { return place_problem(s.scene, s.motion, s.place); });
+  f.map("people", s.people, "People beside the first one, by name, in clothes of their own");
+  f.rule({"people", "clips", "kind", "object"}, [&s]() -> std::string {
+    if (s.people.empty()) return "";
+    for (const auto& [name, person] : s.people) {
+      if (name == kHumanMasks || name == choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, s.object))
+        return "\"" + name + "\" is the name of the first person's or the object's masks; use another name";
+    }
+    if (s.kind != SyntheticKind::kClip) return "views and photos show one person";
+    return s.clips > 1 ? "the clips of a chain show one person" : "";
+  });
   f.number("variation", s.variation, {.min = 0, .max = 1},
            "How far the seed varies timing, camera, start, clothes and light; 0: not at all");
   describe_files(f, s);
@@ -199,7 +232,11 @@ std::string synthetic_settings_json(const SyntheticSettings& settings, const Bod
   ConfigFields fields;
   describe(fields, copy);
   if (body.kind != BodyKind::kProcedural || !body.shape.empty()) fields.object("body", body_copy, "The body model");
-  return to_json(write_config(fields));
+  ConfigValue tree = write_config(fields);
+  std::erase_if(tree.members, [](const ConfigMember& member) {  // as it was written before there were some
+    return member.key == "people" && member.value.members.empty();
+  });
+  return to_json(tree);
 }
 
 }  // namespace hsi4d

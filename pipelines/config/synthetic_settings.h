@@ -167,6 +167,15 @@ struct SyntheticMaskNoise {
   double dropped_share = 0;  ///< of masks that show nothing
 };
 
+/// A person beside the first one, without an object.
+struct SyntheticPerson {
+  SyntheticMotionKind motion = SyntheticMotionKind::kWalk;
+  std::array<double, 2> beside = {0.9, 0.6};  ///< x, y from where the first person acts to where this one does, metres
+  double turn_deg = 0;                        ///< of the motion about where it is done, about z
+  double begin = 0;                           ///< seconds of the motion that are over in frame 0
+  std::int64_t seed = 1;                      ///< added to that of the dataset, for Gaussians, clothes and noise
+};
+
 /// What a synthetic dataset holds.
 struct SyntheticSettings {
   SyntheticKind kind = SyntheticKind::kClip;
@@ -181,8 +190,9 @@ struct SyntheticSettings {
   SyntheticSceneKind scene = SyntheticSceneKind::kLivingRoom;
   SyntheticObjectKind object = SyntheticObjectKind::kWateringCan;
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
-  std::string place;     ///< of the scene, where the motion is done; empty: the first that it can be done at
-  double variation = 0;  ///< how far the seed changes timing, camera, start and appearance
+  std::string place;  ///< of the scene, where the motion is done; empty: the first that it can be done at
+  ConfigMap<SyntheticPerson> people;    ///< beside the first one, by name
+  double variation = 0;                 ///< how far the seed changes timing, camera, start and appearance
   std::filesystem::path scene_file;     ///< stands in for the scene
   std::array<double, 3> scene_place{};  ///< of the file, where the person acts; metres after scene_scale
   double scene_turn_deg = 0;            ///< about z
@@ -217,6 +227,7 @@ struct SyntheticSettings {
 
 /// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, SyntheticSettings& settings);
+void describe(ConfigFields& fields, SyntheticPerson& settings);
 void describe(ConfigFields& fields, SyntheticLight& settings);
 void describe(ConfigFields& fields, SyntheticFaults& settings);
 void describe(ConfigFields& fields, SyntheticMaskNoise& settings);

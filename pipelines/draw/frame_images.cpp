@@ -29,7 +29,9 @@ void add_covered(const Image& mask, double threshold, int margin, Image& covered
 
 void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered) {
   add_covered(frame.human_mask, data.mask_threshold, data.mask_margin_px, covered);
-  for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
+  for (const auto* masks : {&frame.object_masks, &frame.other_masks}) {
+    for (const Image& mask : *masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
+  }
 }
 
 Image background_of(const ClipFrame& frame) {
@@ -46,9 +48,11 @@ Image background_of(const ClipFrame& frame) {
 
 Image foreground_of(const ClipFrame& frame) {
   Image result = frame.human_mask;
-  for (const Image& mask : frame.object_masks) {
-    for (int y = 0; y < result.height(); ++y) {
-      for (int x = 0; x < result.width(); ++x) result(0, y, x) = std::max(result(0, y, x), mask(0, y, x));
+  for (const auto* masks : {&frame.object_masks, &frame.other_masks}) {
+    for (const Image& mask : *masks) {
+      for (int y = 0; y < result.height(); ++y) {
+        for (int x = 0; x < result.width(); ++x) result(0, y, x) = std::max(result(0, y, x), mask(0, y, x));
+      }
     }
   }
   return result;

@@ -12,7 +12,7 @@ namespace hsi4d {
 /// Rows of what moves that a frame graph draws.
 struct SeenRows {
   std::vector<std::vector<Index>> objects;  ///< by object, ascending
-  std::vector<Index> human;                 ///< ascending
+  std::vector<std::vector<Index>> people;   ///< by person, ascending
 };
 
 /// A camera, and how far it may turn about what it looks at.

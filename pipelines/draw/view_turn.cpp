@@ -18,13 +18,15 @@ std::vector<Vector3<double>> to_camera(const Clip& clip, const SceneState& state
   std::vector<Vector3<double>> directions;
   for (const ObjectPose& object : state.objects)
     directions.emplace_back(so3_exp(object.rotation).transpose() * (center - object.translation));
-  const PosedJoints posed = pose_skeleton(clip.avatar, state.body);
-  for (std::size_t j = 0; j < posed.joints.size() / 3; ++j) {
-    Matrix3<double> world_from_joint;
-    for (std::size_t i = 0; i < 9; ++i)
-      world_from_joint(static_cast<Index>(i / 3), static_cast<Index>(i % 3)) =
-          posed.transforms[12 * j + 4 * (i / 3) + i % 3];
-    directions.emplace_back(world_from_joint.transpose() * (center - Vector3<double>(posed.joints.data() + 3 * j)));
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    const PosedJoints posed = pose_skeleton(clip.person(p).avatar, state.person(p));
+    for (std::size_t j = 0; j < posed.joints.size() / 3; ++j) {
+      Matrix3<double> world_from_joint;
+      for (std::size_t i = 0; i < 9; ++i)
+        world_from_joint(static_cast<Index>(i / 3), static_cast<Index>(i % 3)) =
+            posed.transforms[12 * j + 4 * (i / 3) + i % 3];
+      directions.emplace_back(world_from_joint.transpose() * (center - Vector3<double>(posed.joints.data() + 3 * j)));
+    }
   }
   return directions;
 }

@@ -93,6 +93,8 @@ PartsInView parts_in_view(const Clip& clip, const SceneState& state) {
   seen.human = is_human_in_view(camera, clip.avatar, state.body);
   for (std::size_t o = 0; o < clip.objects.size(); ++o)
     seen.objects.push_back(is_object_in_view(camera, clip.objects[o].gaussians, state.objects[o]));
+  for (std::size_t p = 0; p < clip.others.size(); ++p)
+    seen.others.push_back(is_human_in_view(camera, clip.others[p].avatar, state.others[p]));
   return seen;
 }
 
@@ -124,6 +126,9 @@ void warn_of_what_is_out_of_view(const Clip& clip, const std::vector<SceneState>
   for (std::size_t o = 0; o < clip.objects.size(); ++o)
     warn_of_none("the object " + json_string(clip.objects[o].name), clip.objects[o].gaussians.count(), frames,
                  [o](const PartsInView& seen) { return seen.objects[o]; });
+  for (std::size_t p = 0; p < clip.others.size(); ++p)
+    warn_of_none("the person " + json_string(clip.others[p].name), clip.others[p].avatar.count(), frames,
+                 [p](const PartsInView& seen) { return seen.others[p]; });
 }
 
 }  // namespace hsi4d

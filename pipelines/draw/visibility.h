@@ -14,6 +14,7 @@ namespace hsi4d {
 struct PartsInView {
   bool scene = false, human = false;
   std::vector<bool> objects = {};  ///< by object
+  std::vector<bool> others = {};   ///< by person beside the first one
 
   bool operator==(const PartsInView&) const = default;
 };

@@ -543,6 +543,18 @@ void read_tracks(const std::vector<std::string>& truths, const std::vector<std::
   measure_protocol(truth, folders, m);
 }
 
+/// A run's motion is that of its first person.
+void note_other_people(Measurement& m) {
+  if (!is_run_folder(m.input)) return;
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(m.input)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("motion_of_")) files.push_back(name);
+  }
+  std::sort(files.begin(), files.end());
+  if (!files.empty()) m.result.notes.push_back("only the first person is measured; the others are in " + joined(files));
+}
+
 /// Looks whether all paths hold what they should, and finds the truths.
 std::vector<std::string> checked_truths(const EvaluationSettings& settings, const std::string& input) {
   check_holds_track(input, "run");
@@ -589,6 +601,7 @@ Evaluation evaluate(const EvaluationSettings& settings, const std::string& input
   measure_objects(folders, points, m);
   take_image_errors(m);
   measure_clip(clip, m.result);
+  note_other_people(m);
   for (const auto& [name, value] : m.result.values) {
     if (!std::isfinite(value)) throw DataError(input + ": " + name + " is not a finite number");
   }

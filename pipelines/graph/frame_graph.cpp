@@ -206,7 +206,12 @@ void FrameGraph<S>::record_moving(std::vector<Part>& parts) {
     parts.push_back(seen ? record_object({object.name, selected(object.gaussians, seen->objects[o]), object.joint})
                          : record_object(object));
   }
-  parts.push_back(seen ? record_human(selected(clip_.avatar, seen->human)) : record_human(clip_.avatar));
+  inputs_.others.resize(clip_.others.size());
+  for (LossInputs<S>& other : inputs_.others) other.is_of_other = true;
+  for (std::size_t p = 0; p < clip_.people(); ++p) {
+    const Avatar& avatar = clip_.person(p).avatar;
+    parts.push_back(seen ? record_human(p, selected(avatar, seen->people[p])) : record_human(p, avatar));
+  }
 }
 
 template <class S>
@@ -271,29 +276,34 @@ typename FrameGraph<S>::Object FrameGraph<S>::object_on_joint(const std::string&
   return object;
 }
 
+/// @param avatar  what is drawn of the person's
 template <class S>
-typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
+typename FrameGraph<S>::Part FrameGraph<S>::record_human(std::size_t person, const Avatar& avatar) {
   const auto n = static_cast<Index>(avatar.opacity_logits.size());
   HSI4D_CHECK_EQ(static_cast<Index>(avatar.parents.size()), kJoints);
+  Human& human = humans_.emplace_back();
+  const std::string& name = clip_.person(person).name;
+  const std::string of = person == 0 ? "" : name + " ";  // leaves of the first person need no name
   GaussianVars<S> vars;
-  vars.means = leaf("human_means", "human means", n, 3, avatar.means.data());
-  vars.quats = leaf("human_quats", "human quats", n, 4, avatar.quats.data());
-  vars.log_scales = leaf("human_log_scales", "human log_scales", n, 3, avatar.log_scales.data());
-  vars.opacity_logits = leaf("human_opacity_logits", "human opacity_logits", n, 1, avatar.opacity_logits.data());
-  vars.colors = leaf("human_colors", "human colors", n, 3, avatar.colors.data());
+  vars.means = leaf("human_means", name + " means", n, 3, avatar.means.data());
+  vars.quats = leaf("human_quats", name + " quats", n, 4, avatar.quats.data());
+  vars.log_scales = leaf("human_log_scales", name + " log_scales", n, 3, avatar.log_scales.data());
+  vars.opacity_logits = leaf("human_opacity_logits", name + " opacity_logits", n, 1, avatar.opacity_logits.data());
+  vars.colors = leaf("human_colors", name + " colors", n, 3, avatar.colors.data());
   for (const JointGroup& joints : kJointGroups) {
-    joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
+    human.joint_rotations.push_back(rotation_leaf(joints.name, of + joints.name, joints.count));
   }
-  transl_ = leaf("transl", "transl", 1, 3, nullptr);
-  rotations_ = record_rotations(concat_rows<S>(joint_rotations_));
-  skeleton_ = record_skeleton(avatar);
-  if (rest_offsets_.tape != nullptr) vars.means = vars.means + rest_offsets_;
-  const PosedSkeleton<S> drawn = {in_scene(skeleton_.transforms, kHeightOfTransform), skeleton_.joints};
-  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, drawn, avatar), n};
+  human.transl = leaf("transl", of + "transl", 1, 3, nullptr);
+  human.rotations = record_rotations(concat_rows<S>(human.joint_rotations));
+  record_skeleton(avatar, human);
+  if (human.rest_offsets.tape != nullptr) vars.means = vars.means + human.rest_offsets;
+  const PosedSkeleton<S> drawn = {in_scene(human.skeleton.transforms, kHeightOfTransform), human.skeleton.joints};
+  if (settings_.color_nets.empty()) return {skinned_splats(vars, human.rotations, drawn, avatar), n};
+  const ColorNet& net = settings_.color_nets[person];
   const HumanColors<S> colors =
-      record_color_net(settings_.seen ? selected(*settings_.color_net, settings_.seen->human) : *settings_.color_net);
+      record_color_net(settings_.seen ? selected(net, settings_.seen->people[person]) : net, human);
   HSI4D_CHECK_EQ(colors.net.features.shape().rows, n);
-  const SplatInputs<S> splats = skinned_splats(vars, rotations_, drawn, avatar, &colors);
+  const SplatInputs<S> splats = skinned_splats(vars, human.rotations, drawn, avatar, &colors);
   hold_colors(splats.colors, {kColorNetGroup, kFeaturesGroup});
   return {splats, n};
 }
@@ -301,8 +311,11 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
 /// The skeleton, and how betas that are looked for move means and joints in the rest pose. The pelvis stays where it is
 /// in the world.
 template <class S>
-PosedSkeleton<S> FrameGraph<S>::record_skeleton(const Avatar& avatar) {
-  if (unknown_.betas.tape == nullptr) return kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
+void FrameGraph<S>::record_skeleton(const Avatar& avatar, Human& human) {
+  if (unknown_.betas.tape == nullptr) {
+    human.skeleton = kinematic_chain(human.rotations, human.transl, avatar.parents, avatar.joints);
+    return;
+  }
   HSI4D_CHECK_EQ(avatar.count(), clip_.avatar.count());
   const auto offsets = [this](const std::vector<double>& directions) {
     const Index betas = clip_.directions->betas, points = std::ssize(directions) / (3 * betas);
@@ -310,10 +323,11 @@ PosedSkeleton<S> FrameGraph<S>::record_skeleton(const Avatar& avatar) {
     return blend_shapes<S>(std::vector<double>(static_cast<std::size_t>(3 * points)),
                            std::array{BlendTerm<S>{prepared, unknown_.betas}});
   };
-  rest_offsets_ = offsets(clip_.directions->means);
+  human.rest_offsets = offsets(clip_.directions->means);
   const Var<S> joint_offsets = offsets(clip_.directions->joints);
   const Var<S> joints = constant_rows<S>(tape_, "rest_joints", avatar.joints, 3) + joint_offsets;
-  return kinematic_chain(rotations_, transl_ - slice_rows(joint_offsets, 0, 1), avatar.parents, joints);
+  human.skeleton =
+      kinematic_chain(human.rotations, human.transl - slice_rows(joint_offsets, 0, 1), avatar.parents, joints);
 }
 
 /// Colours that are computed anew only where one of the groups moves, if that is wanted.
@@ -323,14 +337,14 @@ void FrameGraph<S>::hold_colors(Var<S> colors, const std::vector<std::string>& g
 }
 
 template <class S>
-HumanColors<S> FrameGraph<S>::record_color_net(const ColorNet& net) {
-  color_net_ = color_net_leaves(tape_, net);
-  add_to_group(kFeaturesGroup, color_net_.features);
-  for (const MlpLayer<S>& layer : color_net_.layers) {
+HumanColors<S> FrameGraph<S>::record_color_net(const ColorNet& net, Human& human) {
+  human.color_net = color_net_leaves(tape_, net);
+  add_to_group(kFeaturesGroup, human.color_net.features);
+  for (const MlpLayer<S>& layer : human.color_net.layers) {
     add_to_group(kColorNetGroup, layer.weights);
     add_to_group(kColorNetGroup, layer.bias);
   }
-  HumanColors<S> colors{color_net_, net.code_joints, {}};
+  HumanColors<S> colors{human.color_net, net.code_joints, {}};
   if (!net.view_direction) return colors;
   const Var<S> center = camera_center(xi_, view_);
   colors.camera_center = settings_.color_camera_gradient ? center : stop_gradient(center);
@@ -349,7 +363,7 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   Index row = 0;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     const bool is_object = p >= first_object && p < first_object + objects_.size();
-    const bool is_human = settings_.draw == Draw::kAll && p + 1 == parts.size();
+    const bool is_human = p >= first_object + objects_.size();
     if ((is_object && settings_.object_opacity) || (is_human && settings_.human_opacity))
       request.groups.emplace_back(row, row + parts[p].count);
     row += parts[p].count;
@@ -371,18 +385,22 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
     record_object_places();
   }
   if (draws_objects()) record_object_masks();
-  if (settings_.human_opacity) record_human_inputs();
-  if ((settings_.keypoints || settings_.bones) && clip_.keypoints) record_keypoints();
+  for (std::size_t p = 0; p < humans_.size(); ++p) {
+    if (settings_.human_opacity) record_human_inputs(p);
+    if ((settings_.keypoints || settings_.bones) && clip_.person(p).keypoints) record_keypoints(p);
+  }
 }
 
-/// Opacities are those of the objects, and last of the human.
+/// Opacities are those of the objects, and last of the people.
 template <class S>
-void FrameGraph<S>::record_human_inputs() {
-  inputs_.human_opacity = draws_objects()
-                              ? slice_planes(rendered_.group_opacity, static_cast<Index>(objects_.size()), 1)
-                              : rendered_.group_opacity;
-  inputs_.human_mask = tape_.constant("human_mask", inputs_.human_opacity.shape());
-  inputs_.human_seen = tape_.constant("human_seen", kScalarShape);
+void FrameGraph<S>::record_human_inputs(std::size_t person) {
+  const Var<S> all = rendered_.group_opacity;
+  const std::size_t plane = (draws_objects() ? objects_.size() : 0) + person;
+  LossInputs<S>& inputs = inputs_of(person);
+  inputs.human_opacity = all.shape().planes == 1 ? all : slice_planes(all, static_cast<Index>(plane), 1);
+  inputs.human_mask = tape_.constant("human_mask", inputs.human_opacity.shape());
+  inputs.human_seen = tape_.constant("human_seen", kScalarShape);
+  inputs.object_masks = inputs_.object_masks;
 }
 
 template <class S>
@@ -410,8 +428,11 @@ void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<Scene
   std::vector<Var<S>> transforms;
   for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
   const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
-  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects, rest_offsets_}, clip_, first, frames, index,
-                     inputs_);
+  for (std::size_t p = 0; p < humans_.size(); ++p) {
+    const Human& human = humans_[p];
+    hsi4d::give_motion(MovingFrames<S>{human.rotations, human.skeleton, objects, human.rest_offsets}, clip_, p, first,
+                       frames, index, inputs_of(p));
+  }
 }
 
 /// The human's points first, then those of the objects.
@@ -477,29 +498,32 @@ void FrameGraph<S>::record_object_places() {
 
 /// A point is a mean of joints.
 template <class S>
-void FrameGraph<S>::record_keypoints() {
-  const std::vector<KeypointJoints>& points = clip_.keypoints->joints;
+void FrameGraph<S>::record_keypoints(std::size_t person) {
+  const Keypoints& keypoints = *clip_.person(person).keypoints;
+  const std::vector<KeypointJoints>& points = keypoints.joints;
   const Var<S> weights = tape_.constant("keypoint_joints", shape_of(std::ssize(points), kJoints));
   for (std::size_t k = 0; k < points.size(); ++k) {
     for (const auto& [joint, weight] : points[k])
       tape_.write(weights)(static_cast<Index>(k), joint) = static_cast<S>(weight);
   }
-  const Var<S> places = matmul(weights, skeleton_.joints);
-  if (settings_.bones && clip_.keypoints->has_landmarks()) record_bones(places);
+  const Var<S> places = matmul(weights, humans_[person].skeleton.joints);
+  if (settings_.bones && keypoints.has_landmarks()) record_bones(person, places);
   if (!settings_.keypoints) return;
-  inputs_.keypoints = places_in_image(places);
-  inputs_.keypoints_target = tape_.constant("keypoints_target", shape_of(std::ssize(points), 3));
+  LossInputs<S>& inputs = inputs_of(person);
+  inputs.keypoints = places_in_image(places);
+  inputs.keypoints_target = tape_.constant("keypoints_target", shape_of(std::ssize(points), 3));
 }
 
 /// Ways between points, in the axes of the camera Exp(ξ) T: rows wᵀ Rᵀ Exp(−ω), ω the rotation of ξ.
 template <class S>
-void FrameGraph<S>::record_bones(Var<S> points) {
-  bones_ = bones_of(clip_.keypoints->joints);
-  if (bones_.empty()) return;
-  const auto count = std::ssize(bones_);
+void FrameGraph<S>::record_bones(std::size_t person, Var<S> points) {
+  std::vector<Bone>& bones = humans_[person].bones;
+  bones = bones_of(clip_.person(person).keypoints->joints);
+  if (bones.empty()) return;
+  const auto count = std::ssize(bones);
   const Var<S> ends = tape_.constant("bone_ends", shape_of(count, points.shape().rows));
   for (Index b = 0; b < count; ++b) {
-    for (const auto& [point, weight] : bones_[static_cast<std::size_t>(b)])
+    for (const auto& [point, weight] : bones[static_cast<std::size_t>(b)])
       tape_.write(ends)(b, point) = static_cast<S>(weight);
   }
   const Var<S> axes = tape_.constant("camera_axes", shape_of(3, 3));           // transposed: it multiplies rows
@@ -507,8 +531,9 @@ void FrameGraph<S>::record_bones(Var<S> points) {
   const Var<S> turn = rotations_from_axis_angle(-slice_cols(xi_, 3, 3));
   const Var<S> rows =
       concat_rows<S>(std::array{slice_cols(turn, 0, 3), slice_cols(turn, 3, 3), slice_cols(turn, 6, 3)});
-  inputs_.bones = matmul(matmul(matmul(ends, points), axes), rows);
-  inputs_.bones_target = tape_.constant("bones_target", shape_of(count, 4));
+  LossInputs<S>& inputs = inputs_of(person);
+  inputs.bones = matmul(matmul(matmul(ends, points), axes), rows);
+  inputs.bones_target = tape_.constant("bones_target", shape_of(count, 4));
 }
 
 template <class S>
@@ -554,11 +579,15 @@ void FrameGraph<S>::set_state(const SceneState& state) {
     write_rotation(objects_[o].orient, 0, state.objects[o].rotation);
     write_numbers(tape_, objects_[o].transl, state.objects[o].translation.data());
   }
-  write_numbers(tape_, transl_, state.body.transl.data());
-  for (std::size_t g = 0; g < kJointGroups.size(); ++g) {
-    for (Index j = 0; j < kJointGroups[g].count; ++j) {
-      const double* axis_angle = state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j);
-      write_rotation(joint_rotations_[g], j, Vector3<double>(axis_angle));
+  HSI4D_CHECK_EQ(state.people(), humans_.size());
+  for (std::size_t p = 0; p < humans_.size(); ++p) {
+    const BodyPose& body = state.person(p);
+    write_numbers(tape_, humans_[p].transl, body.transl.data());
+    for (std::size_t g = 0; g < kJointGroups.size(); ++g) {
+      for (Index j = 0; j < kJointGroups[g].count; ++j) {
+        const double* axis_angle = body.axis_angle.data() + 3 * (kJointGroups[g].first + j);
+        write_rotation(humans_[p].joint_rotations[g], j, Vector3<double>(axis_angle));
+      }
     }
   }
 }
@@ -583,12 +612,15 @@ void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, S
     if (is_moved(kObjectOrientGroup)) state.objects[o].rotation = read_rotation(objects_[o].orient, 0);
     if (is_moved(kObjectTranslGroup)) state.objects[o].translation = read_vector(tape_, objects_[o].transl);
   }
-  if (is_moved("transl")) state.body.transl = read_vector(tape_, transl_);
-  for (std::size_t g = 0; g < joint_rotations_.size(); ++g) {
-    if (!is_moved(kJointGroups[g].name)) continue;
-    for (Index j = 0; j < kJointGroups[g].count; ++j) {
-      const Vector3<double> axis_angle = read_rotation(joint_rotations_[g], j);
-      std::copy_n(axis_angle.data(), 3, state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j));
+  for (std::size_t p = 0; p < humans_.size(); ++p) {
+    BodyPose& body = state.person(p);
+    if (is_moved("transl")) body.transl = read_vector(tape_, humans_[p].transl);
+    for (std::size_t g = 0; g < kJointGroups.size(); ++g) {
+      if (!is_moved(kJointGroups[g].name)) continue;
+      for (Index j = 0; j < kJointGroups[g].count; ++j) {
+        const Vector3<double> axis_angle = read_rotation(humans_[p].joint_rotations[g], j);
+        std::copy_n(axis_angle.data(), 3, body.axis_angle.data() + 3 * (kJointGroups[g].first + j));
+      }
     }
   }
 }
@@ -610,10 +642,11 @@ ClipUnknowns FrameGraph<S>::unknowns() const {
 }
 
 template <class S>
-void FrameGraph<S>::read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const {
-  if (color_net_.layers.empty()) return;
-  if (find_entry(moved, kColorNetGroup) != nullptr) read_layers(color_net_, net);
-  if (find_entry(moved, kFeaturesGroup) != nullptr) read_features(color_net_, net);
+void FrameGraph<S>::read_color_nets(const ConfigMap<ParameterGroupSettings>& moved, std::vector<ColorNet>& nets) const {
+  for (std::size_t p = 0; p < humans_.size() && p < settings_.color_nets.size(); ++p) {
+    if (find_entry(moved, kColorNetGroup) != nullptr) read_layers(humans_[p].color_net, nets[p]);
+    if (find_entry(moved, kFeaturesGroup) != nullptr) read_features(humans_[p].color_net, nets[p]);
+  }
 }
 
 template <class S>
@@ -625,12 +658,9 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
   } else {
     fill(inputs_.weight, S(1));
   }
-  if (inputs_.given(inputs_.human_mask)) {
-    write_image(inputs_.human_mask, *targets.human_mask);
-    fill(inputs_.human_seen, S(targets.human_seen ? 1 : 0));
-  }
-  if (inputs_.given(inputs_.keypoints_target)) set_keypoints(*targets.keypoints);
-  if (inputs_.given(inputs_.bones_target)) set_bones(*targets.keypoints);
+  for (std::size_t p = 0; p < humans_.size(); ++p)
+    set_person(p, p == 0 ? PersonTargets{targets.human_mask, targets.human_seen, targets.keypoints}
+                         : targets.others.at(p - 1));
   if (inputs_.given(inputs_.depth_map)) set_depth_map(targets.depth_map != nullptr ? *targets.depth_map : DepthMap());
   if (!inputs_.given(inputs_.object_depth)) return;
   HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
@@ -639,9 +669,20 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
 }
 
 template <class S>
-void FrameGraph<S>::set_keypoints(const std::vector<Keypoint>& found) {
+void FrameGraph<S>::set_person(std::size_t person, const PersonTargets& targets) {
+  LossInputs<S>& inputs = inputs_of(person);
+  if (inputs.given(inputs.human_mask)) {
+    write_image(inputs.human_mask, *targets.mask);
+    fill(inputs.human_seen, S(targets.seen ? 1 : 0));
+  }
+  if (inputs.given(inputs.keypoints_target)) set_keypoints(*targets.keypoints, inputs);
+  if (inputs.given(inputs.bones_target)) set_bones(*targets.keypoints, humans_[person].bones, inputs);
+}
+
+template <class S>
+void FrameGraph<S>::set_keypoints(const std::vector<Keypoint>& found, LossInputs<S>& inputs) {
   for (std::size_t k = 0; k < found.size(); ++k) {
-    S* row = tape_.write(inputs_.keypoints_target).row(static_cast<Index>(k));
+    S* row = tape_.write(inputs.keypoints_target).row(static_cast<Index>(k));
     row[0] = static_cast<S>(found[k].x * view_.camera.width);
     row[1] = static_cast<S>(found[k].y * view_.camera.height);
     row[2] = static_cast<S>(found[k].confidence);
@@ -650,18 +691,19 @@ void FrameGraph<S>::set_keypoints(const std::vector<Keypoint>& found) {
 
 /// Confidence 0 where an end is not known, or both are one.
 template <class S>
-void FrameGraph<S>::set_bones(const std::vector<Keypoint>& found) {
-  for (std::size_t b = 0; b < bones_.size(); ++b) {
+void FrameGraph<S>::set_bones(const std::vector<Keypoint>& found, const std::vector<Bone>& bones,
+                              LossInputs<S>& inputs) {
+  for (std::size_t b = 0; b < bones.size(); ++b) {
     Vector3<double> way = Vector3<double>::Zero();
     double confidence = 1;
-    for (const auto& [point, weight] : bones_[b]) {
+    for (const auto& [point, weight] : bones[b]) {
       const Keypoint& end = found[static_cast<std::size_t>(point)];
       confidence = end.landmark ? std::min(confidence, end.confidence) : 0;
       way += weight * end.landmark.value_or(Vector3<double>::Zero());
       if (confidence == 0) break;
     }
     if (!(way.norm() > 0)) confidence = 0;
-    S* row = tape_.write(inputs_.bones_target).row(static_cast<Index>(b));
+    S* row = tape_.write(inputs.bones_target).row(static_cast<Index>(b));
     for (Index i = 0; i < 3; ++i) row[i] = static_cast<S>(confidence > 0 ? way.normalized()[i] : 0);
     row[3] = static_cast<S>(confidence);
   }

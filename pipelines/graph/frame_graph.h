@@ -2,13 +2,14 @@
 //
 //   scene       means, quats, log_scales, opacity_logits, sh                                ─┐
 //   object o    the same, moved by [exp(orient) | transl], or on a joint by one number        ├─ render ─ image, masks
-//   human       rotations → kinematic chain → blended transforms → means, axes; color net   ─┘
+//   person p    rotations → kinematic chain → blended transforms → means, axes; color net   ─┘
 //
 // Every number that the image depends on is a leaf, frozen unless a stage moves it, so that each can be optimised, and
-// checked, by its group's name.
+// checked, by its group's name: those of all objects, or of all people, are blocks of one group.
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,13 +37,14 @@ struct FrameGraphSettings {
   CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
   Vector3<double> background = Vector3<double>::Zero();
-  const ColorNet* color_net = nullptr;  ///< of the human's colours, read when the graph is recorded; null: the avatar's
-  bool color_camera_gradient = false;   ///< colours of the net have a gradient in the camera, by the direction of view
-  bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
-  bool object_opacity = false;          ///< likewise of the objects, a channel each
-  bool keypoints = false;               ///< the losses read the clip's keypoints
-  bool bones = false;                   ///< the losses read directions of bones, where the clip's keypoints have them
-  bool depth_map = false;               ///< the losses read depths of pixels, which cost two channels of the render
+  std::span<const ColorNet> color_nets =
+      {};                              ///< by person, read when the graph is recorded; empty: the avatars' colours
+  bool color_camera_gradient = false;  ///< colours of the net have a gradient in the camera, by the direction of view
+  bool human_opacity = false;          ///< the losses read the people's opacity, a channel of the render each
+  bool object_opacity = false;         ///< likewise of the objects, a channel each
+  bool keypoints = false;              ///< the losses read the clip's keypoints
+  bool bones = false;                  ///< the losses read directions of bones, where the clip's keypoints have them
+  bool depth_map = false;              ///< the losses read depths of pixels, which cost two channels of the render
   std::vector<std::string> unknowns = {};  ///< groups of what the clip's files do not know that are leaves: see below
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
@@ -65,6 +67,13 @@ struct UnknownVars {
   Var<S> betas;                      ///< [1,B]
 };
 
+/// What a person beside the first one is compared with, as FrameTargets has it of that.
+struct PersonTargets {
+  const Image* mask = nullptr;
+  bool seen = true;
+  const std::vector<Keypoint>* keypoints = nullptr;
+};
+
 /// What a frame is compared with.
 struct FrameTargets {
   const Image* image = nullptr;                 ///< [3,H,W]
@@ -76,6 +85,7 @@ struct FrameTargets {
   std::vector<const Image*> object_masks = {};  ///< coverage by object; needed with settings.object_opacity
   const std::vector<Keypoint>* keypoints = nullptr;  ///< of the frame; needed with settings.keypoints and bones
   const DepthMap* depth_map = nullptr;               ///< of the frame; null, or empty: nothing is known
+  std::vector<PersonTargets> others = {};            ///< of the clip's other people
 };
 
 /// The frame graph. The tape and the clip must outlive it.
@@ -92,8 +102,8 @@ class FrameGraph {
   /// Reads the leaves of the groups named in `moved` back into `state`; the rest of it keeps its bits. Rotations come
   /// as axis-angle with angles up to π.
   void read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const;
-  /// Reads features and layers of the color net back, those of them that are named in `moved`.
-  void read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const;
+  /// Reads features and layers of the color nets back, those of them that are named in `moved`.
+  void read_color_nets(const ConfigMap<ParameterGroupSettings>& moved, std::vector<ColorNet>& nets) const;
   /// What the unknown groups say, beside the clip.
   ClipUnknowns unknowns() const;
   /// Records what terms over the body's motion read. For graphs that draw all, once, after set_state.
@@ -128,6 +138,15 @@ class FrameGraph {
     Var<S> turn;            // [1,9] the rotation
     Var<S> rotation;        // [1,9] the same, times the object's factor where that is unknown
   };
+  struct Human {
+    Var<S> transl;
+    Var<S> rest_offsets;                  // [N,3] of its means by unknown betas, or empty
+    std::vector<Var<S>> joint_rotations;  // by kJointGroups
+    Var<S> rotations;                     // [55,9] that they give
+    PosedSkeleton<S> skeleton;
+    ColorNetVars<S> color_net;  // empty without a color net
+    std::vector<Bone> bones;    // between the person's keypoints
+  };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
   ParameterGroup<S>& add_to_group(const std::string& group, Var<S> leaf);
@@ -144,23 +163,25 @@ class FrameGraph {
   Part record_object(const ClipObject& object);
   Object free_object(const std::string& name);
   Object object_on_joint(const std::string& name, const ObjectJoint& joint);
-  Part record_human(const Avatar& avatar);
-  PosedSkeleton<S> record_skeleton(const Avatar& avatar);
-  HumanColors<S> record_color_net(const ColorNet& net);
+  Part record_human(std::size_t person, const Avatar& avatar);
+  void record_skeleton(const Avatar& avatar, Human& human);
+  HumanColors<S> record_color_net(const ColorNet& net, Human& human);
   void hold_colors(Var<S> colors, const std::vector<std::string>& groups);
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
-  void record_human_inputs();
-  void record_keypoints();
-  void record_bones(Var<S> points);
+  LossInputs<S>& inputs_of(std::size_t person) { return person == 0 ? inputs_ : inputs_.others[person - 1]; }
+  void record_human_inputs(std::size_t person);
+  void record_keypoints(std::size_t person);
+  void record_bones(std::size_t person, Var<S> points);
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
   void record_object_depths(const std::vector<Part>& parts, std::size_t first_object);
   void record_object_places();
   Var<S> places_in_image(Var<S> points) const;
   void record_object_masks();
   void set_object_masks(const FrameTargets& targets);
-  void set_keypoints(const std::vector<Keypoint>& found);
-  void set_bones(const std::vector<Keypoint>& found);
+  void set_person(std::size_t person, const PersonTargets& targets);
+  void set_keypoints(const std::vector<Keypoint>& found, LossInputs<S>& inputs);
+  void set_bones(const std::vector<Keypoint>& found, const std::vector<Bone>& bones, LossInputs<S>& inputs);
   void set_depth_map(const DepthMap& map);
   bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
@@ -179,14 +200,8 @@ class FrameGraph {
   Var<S> intrinsics_;  // [1,4], or empty: the clip's
   std::vector<Object> objects_;
   std::vector<ParameterRange> joint_ranges_;  // by block of the joints' group
-  Var<S> transl_;
-  Var<S> rest_offsets_;                  // [N,3] of the human's means by unknown betas, or empty
-  std::vector<Var<S>> joint_rotations_;  // by kJointGroups
-  Var<S> rotations_;                     // [55,9] that they give
-  PosedSkeleton<S> skeleton_;
-  ColorNetVars<S> color_net_;  // empty without a color net
+  std::vector<Human> humans_;
   Rendered<S> rendered_;
-  std::vector<Bone> bones_;  // between the clip's keypoints
   LossInputs<S> inputs_;
 };
 

@@ -29,24 +29,26 @@ std::vector<AnnotatedContact> contacts_of(const std::vector<AnnotatedContact>& a
   return contacts;
 }
 
-std::shared_ptr<const MotionStart> start_of(const Clip& clip, const SceneState& first,
+/// Contacts are annotated of the first person.
+std::shared_ptr<const MotionStart> start_of(const Clip& clip, std::size_t person, const SceneState& first,
                                             const std::vector<SceneState>& frames, Index index, Index moving) {
+  const ClipPerson& who = clip.person(person);
   auto start = std::make_shared<MotionStart>();
-  start->avatar = &clip.avatar;
-  start->mesh = clip.body ? &*clip.body : nullptr;
+  start->avatar = &who.avatar;
+  start->mesh = who.body ? &*who.body : nullptr;
   for (const ClipObject& object : clip.objects) start->objects.push_back(&object.gaussians);
   start->scene = &clip.scene;
   start->first_camera_center = inverse(first.camera_from_world).translation;
   start->still_frames = std::ssize(frames) - moving;
   start->frame_rate = clip.frame_rate;
-  start->first_body = pose_skeleton(clip.avatar, first.body);
+  start->first_body = pose_skeleton(who.avatar, first.person(person));
   for (const SceneState& frame : frames) {
-    start->body.push_back(pose_skeleton(clip.avatar, frame.body));
+    start->body.push_back(pose_skeleton(who.avatar, frame.person(person)));
     std::vector<Rigid<double>> objects;
     for (const ObjectPose& pose : frame.objects) objects.push_back({so3_exp(pose.rotation), pose.translation});
     start->world_from_object.push_back(std::move(objects));
   }
-  if (clip.contacts) start->contacts = contacts_of(*clip.contacts, index, *start);
+  if (clip.contacts && person == 0) start->contacts = contacts_of(*clip.contacts, index, *start);
   return start;
 }
 
@@ -156,10 +158,10 @@ Var<S> record_object_points(Tape<S>& tape, Var<S> transforms, const MotionStart&
 }  // namespace
 
 template <class S>
-void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
+void give_motion(const MovingFrames<S>& moving, const Clip& clip, std::size_t person, const SceneState& first,
                  const std::vector<SceneState>& frames, Index index, LossInputs<S>& inputs) {
   const Index count = moving.rotations.shape().rows / kSmplxJoints;
-  const std::shared_ptr<const MotionStart> motion = start_of(clip, first, frames, index, count);
+  const std::shared_ptr<const MotionStart> motion = start_of(clip, person, first, frames, index, count);
   inputs.motion = motion;
   inputs.body_rotations = body_rotation_rows(moving.rotations);
   inputs.joints = joint_rows(moving, *motion);
@@ -175,9 +177,9 @@ void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneSta
   };
 }
 
-template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
-                          Index, LossInputs<float>&);
-template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
-                          Index, LossInputs<double>&);
+template void give_motion(const MovingFrames<float>&, const Clip&, std::size_t, const SceneState&,
+                          const std::vector<SceneState>&, Index, LossInputs<float>&);
+template void give_motion(const MovingFrames<double>&, const Clip&, std::size_t, const SceneState&,
+                          const std::vector<SceneState>&, Index, LossInputs<double>&);
 
 }  // namespace hsi4d

@@ -18,17 +18,18 @@ struct MovingFrames {
 
 /// Fills in body_rotations, joints, joints_start, motion, body_points and object_points.
 ///
+/// @param person  whose motion it is
 /// @param first   the clip's first frame
 /// @param frames  states when the stage begins: some that stand still, then the M that move
 /// @param index   in the clip, of the first of these
 /// The clip must outlive the inputs.
 template <class S>
-void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
+void give_motion(const MovingFrames<S>& moving, const Clip& clip, std::size_t person, const SceneState& first,
                  const std::vector<SceneState>& frames, Index index, LossInputs<S>& inputs);
 
-extern template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&,
+extern template void give_motion(const MovingFrames<float>&, const Clip&, std::size_t, const SceneState&,
                                  const std::vector<SceneState>&, Index, LossInputs<float>&);
-extern template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&,
+extern template void give_motion(const MovingFrames<double>&, const Clip&, std::size_t, const SceneState&,
                                  const std::vector<SceneState>&, Index, LossInputs<double>&);
 
 }  // namespace hsi4d

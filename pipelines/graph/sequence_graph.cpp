@@ -8,7 +8,6 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
-#include "pipelines/graph/motion_inputs.h"
 #include "pipelines/graph/tape_rows.h"
 
 namespace hsi4d {
@@ -19,10 +18,10 @@ constexpr Index kRowNumbers = 9;  // of a rotation
 constexpr Index kOtherJoints = kSmplxJoints - 1 - kBodyPoseJoints;
 
 /// Axis-angle vectors of joints [first, first + count) in frames 1 to T.
-std::vector<double> axis_angles(const std::vector<SceneState>& states, Index first, Index count) {
+std::vector<double> axis_angles(const std::vector<BodyPose>& poses, Index first, Index count) {
   std::vector<double> all;
-  for (std::size_t t = 1; t < states.size(); ++t) {
-    const auto begin = states[t].body.axis_angle.begin() + 3 * first;
+  for (std::size_t t = 1; t < poses.size(); ++t) {
+    const auto begin = poses[t].axis_angle.begin() + 3 * first;
     all.insert(all.end(), begin, begin + 3 * count);
   }
   return all;
@@ -68,54 +67,72 @@ SequenceGraph<S>::SequenceGraph(Tape<S>& tape, const Clip& clip, const std::vect
                                 const PosePrior* prior, RotationParameters rotations)
     : tape_(tape), rotation_parameters_(rotations), frames_(std::ssize(states) - 1) {
   HSI4D_CHECK(frames_ > 0, "a sequence needs a frame beside the first");
-  transl_ = leaf(kTranslGroup, 3);
-  std::vector<double> places;
-  for (std::size_t t = 1; t < states.size(); ++t) {
-    const Vector3<double>& transl = states[t].body.transl;
-    places.insert(places.end(), transl.data(), transl.data() + 3);
+  inputs_.others.resize(clip.others.size());
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    LossInputs<S>& inputs = p == 0 ? inputs_ : inputs_.others[p - 1];
+    inputs.is_of_other = p > 0;
+    const MovingFrames<S> moving = record_human(clip.person(p).avatar, bodies_of(states, p), prior);
+    give_motion(moving, clip, p, states.front(), states, 0, inputs);
   }
-  write_rows(transl_, places);
-  MovingFrames<S> moving;
-  moving.rotations = record_rotations(states, prior);
-  moving.skeleton = kinematic_chain(moving.rotations, transl_, clip.avatar.parents, clip.avatar.joints);
-  give_motion(moving, clip, states.front(), states, 0, inputs_);
   for (const ParameterGroup<S>& group : groups_) {
     for (const Var<S> block : group.blocks) tape_.freeze(block);
   }
 }
 
 template <class S>
+ParameterGroup<S>& SequenceGraph<S>::group_of(const std::string& name) {
+  auto place = std::find_if(groups_.begin(), groups_.end(), [&](const auto& known) { return known.name == name; });
+  if (place == groups_.end()) place = groups_.insert(place, ParameterGroup<S>{name, {}});
+  return *place;
+}
+
+template <class S>
 Var<S> SequenceGraph<S>::leaf(const std::string& group, Index cols) {
   const Var<S> var = tape_.parameter(group, shape_of(frames_, cols));
-  groups_.push_back({group, {var}});
+  group_of(group).blocks.push_back(var);
   return var;
+}
+
+template <class S>
+MovingFrames<S> SequenceGraph<S>::record_human(const Avatar& avatar, const std::vector<BodyPose>& poses,
+                                               const PosePrior* prior) {
+  Human& human = humans_.emplace_back();
+  human.transl = leaf(kTranslGroup, 3);
+  std::vector<double> places;
+  for (std::size_t t = 1; t < poses.size(); ++t)
+    places.insert(places.end(), poses[t].transl.data(), poses[t].transl.data() + 3);
+  write_rows(human.transl, places);
+  MovingFrames<S> moving;
+  moving.rotations = record_rotations(poses, prior, human);
+  moving.skeleton = kinematic_chain(moving.rotations, human.transl, avatar.parents, avatar.joints);
+  return moving;
 }
 
 /// [55T,9], a frame after the other: heading, the body's joints, and what stays.
 template <class S>
-Var<S> SequenceGraph<S>::record_rotations(const std::vector<SceneState>& states, const PosePrior* prior) {
+Var<S> SequenceGraph<S>::record_rotations(const std::vector<BodyPose>& poses, const PosePrior* prior, Human& human) {
   const bool is_axis_angle = rotation_parameters_ == RotationParameters::kAxisAngle;
-  orient_ = leaf(kOrientGroup, is_axis_angle ? 3 : 6);
-  groups_.back().are_axis_angles = is_axis_angle;
-  write_rows(orient_, rotation_numbers(axis_angles(states, 0, 1), rotation_parameters_));
-  const Var<S> headings = is_axis_angle ? rotations_from_axis_angle(orient_) : rotations_from_6d(orient_);
-  const Var<S> others = constant_rotations("hands and head", axis_angles(states, 1 + kBodyPoseJoints, kOtherJoints));
-  const std::array parts = {headings, record_body(states, prior), others};
+  human.orient = leaf(kOrientGroup, is_axis_angle ? 3 : 6);
+  group_of(kOrientGroup).are_axis_angles = is_axis_angle;
+  write_rows(human.orient, rotation_numbers(axis_angles(poses, 0, 1), rotation_parameters_));
+  const Var<S> headings = is_axis_angle ? rotations_from_axis_angle(human.orient) : rotations_from_6d(human.orient);
+  const Var<S> others = constant_rotations("hands and head", axis_angles(poses, 1 + kBodyPoseJoints, kOtherJoints));
+  const std::array parts = {headings, record_body(poses, prior, human), others};
   return reshape(concat_cols<S>(parts), frames_ * kSmplxJoints, kRowNumbers);
 }
 
 /// [T,9·21]
 template <class S>
-Var<S> SequenceGraph<S>::record_body(const std::vector<SceneState>& states, const PosePrior* prior) {
-  const std::vector<double> start = axis_angles(states, 1, kBodyPoseJoints);
+Var<S> SequenceGraph<S>::record_body(const std::vector<BodyPose>& poses, const PosePrior* prior, Human& human) {
+  const std::vector<double> start = axis_angles(poses, 1, kBodyPoseJoints);
   if (prior == nullptr) {
-    groups_.push_back({kPoseLatents, {}});
+    group_of(kPoseLatents);
     return constant_rotations("body", start);
   }
   const Var<S> latents = leaf(kPoseLatents, prior->latents());
   write_rows(latents, prior->encode(start));
-  body_rotations_ = prior->decode(latents);
-  return reshape(body_rotations_, frames_, kRowNumbers * kBodyPoseJoints);
+  human.body_rotations = prior->decode(latents);
+  return reshape(human.body_rotations, frames_, kRowNumbers * kBodyPoseJoints);
 }
 
 /// [T,9 a joint]
@@ -129,22 +146,24 @@ template <class S>
 void SequenceGraph<S>::read_states(const ConfigMap<ParameterGroupSettings>& moved,
                                    std::vector<SceneState>& states) const {
   const auto is_moved = [&moved](const char* group) { return find_entry(moved, group) != nullptr; };
-  for (Index t = 0; t < frames_; ++t) {
-    BodyPose& body = states[static_cast<std::size_t>(t + 1)].body;
+  for (Index i = 0; i < frames_ * std::ssize(humans_); ++i) {
+    const Index t = i % frames_, p = i / frames_;
+    const Human& human = humans_[static_cast<std::size_t>(p)];
+    BodyPose& body = states[static_cast<std::size_t>(t + 1)].person(static_cast<std::size_t>(p));
     if (is_moved(kTranslGroup)) {
-      const S* place = tape_.value(transl_).row(t);
+      const S* place = tape_.value(human.transl).row(t);
       body.transl = {static_cast<double>(place[0]), static_cast<double>(place[1]), static_cast<double>(place[2])};
     }
     if (is_moved(kOrientGroup)) {
-      const S* x = tape_.value(orient_).row(t);
+      const S* x = tape_.value(human.orient).row(t);
       Vector3<double> w(static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2]));
       if (rotation_parameters_ == RotationParameters::kSixD)
         w = so3_log(rotation_from_6d(
             w, Vector3<double>(static_cast<double>(x[3]), static_cast<double>(x[4]), static_cast<double>(x[5]))));
       body.set_rotation(0, w);
     }
-    if (body_rotations_.tape == nullptr || !is_moved(kPoseLatents)) continue;
-    const ConstArray<S> rotations = tape_.value(body_rotations_);
+    if (human.body_rotations.tape == nullptr || !is_moved(kPoseLatents)) continue;
+    const ConstArray<S> rotations = tape_.value(human.body_rotations);
     for (Index j = 0; j < kBodyPoseJoints; ++j)
       body.set_rotation(j + 1, so3_log(matrix_of(rotations.row(t * kBodyPoseJoints + j))));
   }

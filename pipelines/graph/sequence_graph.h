@@ -1,6 +1,8 @@
 // All frames of a clip on a tape, without an image: from the parameters of the body to the inputs of the losses that
 // look at its motion. Objects and cameras stand as they are.
 //
+// Of each person:
+//
 //   latents z_t → prior → rotations ─┐
 //   transl, global_orient            ├─ kinematic_chain ─ joints, places of hands and feet    [method.md, stage 3]
 //   hands, jaw, eyes: constants     ─┘
@@ -14,6 +16,7 @@
 #include "optim/parameters.h"
 #include "pipelines/config/parameter_groups.h"
 #include "pipelines/config/run_config.h"
+#include "pipelines/graph/motion_inputs.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/state.h"
 
@@ -36,17 +39,22 @@ class SequenceGraph {
   void read_states(const ConfigMap<ParameterGroupSettings>& moved, std::vector<SceneState>& states) const;
 
  private:
+  struct Human {
+    Var<S> transl, orient;
+    Var<S> body_rotations;  // [21T,9]; empty without a prior
+  };
+  ParameterGroup<S>& group_of(const std::string& name);
   Var<S> leaf(const std::string& group, Index cols);
-  Var<S> record_rotations(const std::vector<SceneState>& states, const PosePrior* prior);
-  Var<S> record_body(const std::vector<SceneState>& states, const PosePrior* prior);
+  MovingFrames<S> record_human(const Avatar& avatar, const std::vector<BodyPose>& poses, const PosePrior* prior);
+  Var<S> record_rotations(const std::vector<BodyPose>& poses, const PosePrior* prior, Human& human);
+  Var<S> record_body(const std::vector<BodyPose>& poses, const PosePrior* prior, Human& human);
   Var<S> constant_rotations(const char* name, const std::vector<double>& axis_angle);
 
   Tape<S>& tape_;
   RotationParameters rotation_parameters_;
   Index frames_;  // that move
   std::vector<ParameterGroup<S>> groups_;
-  Var<S> transl_, orient_;
-  Var<S> body_rotations_;  // [21T,9]; empty without a prior
+  std::vector<Human> humans_;
   LossInputs<S> inputs_;
 };
 

@@ -27,12 +27,21 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The poses of data.motion, laid on frame 0, or else those of the initial state; empty: none.
-std::vector<BodyPose> estimate_of(const DataSettings& data, const SceneSetup& setup, const Avatar& avatar,
-                                  const FrameSource& frames) {
+std::vector<BodyPose> estimate_of(const DataSettings& data, const SetupPerson& setup, const FrameSource& frames) {
   if (data.motion.empty()) return estimated_poses(setup.motion, setup.motion_file, frames);
   const BodyPose& first = setup.motion.poses.front();
+  const Avatar& avatar = setup.avatar;
   return laid_on(read_estimate(data.motion, avatar, frames, first, data.motion_align), first, pelvis_of(avatar.joints),
                  data.motion_align);
+}
+
+/// A person whose files `data` names.
+void take_person(const DataSettings& data, SetupPerson& setup, const FrameSource& frames, ClipPerson& person) {
+  person.estimate = estimate_of(data, setup, frames);
+  if (!data.keypoints.empty()) person.keypoints = read_keypoints(data, frames);
+  person.betas = setup.motion.betas;
+  person.gender = setup.motion.gender;
+  person.avatar = std::move(setup.avatar);
 }
 
 /// As estimate_of, of the objects.
@@ -52,18 +61,27 @@ double rate_of(const FrameSource& frames, const SceneSetup& setup) {
   return setup.motion.frame_rate;
 }
 
-std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Avatar& avatar,
+/// The poses of a person.
+std::vector<BodyPose> read_true_bodies(const std::string& file, const Avatar& avatar, const FrameSource& frames) {
+  const Motion motion = read_motion_for(file, avatar);
+  check_begins_with_frame_0(motion, file, "a truth is of all frames from 0 on");
+  return kept_frames(motion.poses, frames, file, "poses");
+}
+
+std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Clip& clip,
                                    const FrameSource& frames) {
-  const auto file = [&folder](const char* name) { return (folder / name).string(); };
-  const Motion motion = read_motion_for(file("motion.npz"), avatar);
-  check_begins_with_frame_0(motion, file("motion.npz"), "a truth is of all frames from 0 on");
-  const std::vector<BodyPose> bodies = kept_frames(motion.poses, frames, file("motion.npz"), "poses");
+  const auto file = [&folder](const std::string& name) { return (folder / name).string(); };
+  const std::vector<BodyPose> bodies = read_true_bodies(file("motion.npz"), clip.avatar, frames);
   const std::vector<Camera> cameras = cameras_of_frames(file("cameras.json"), frames);
   std::vector<std::vector<ObjectPose>> objects(bodies.size());
   if (!names.empty())
     objects = kept_frames(read_object_tracks(file("objects.npz"), names), frames, file("objects.npz"), "frames");
   std::vector<SceneState> truth(bodies.size());
   for (std::size_t t = 0; t < truth.size(); ++t) truth[t] = {cameras[t].camera_from_world, objects[t], bodies[t]};
+  for (const ClipPerson& person : clip.others) {
+    const std::vector<BodyPose> poses = read_true_bodies(file(motion_file_of(person.name)), person.avatar, frames);
+    for (std::size_t t = 0; t < truth.size(); ++t) truth[t].others.push_back(poses[t]);
+  }
   return truth;
 }
 
@@ -107,7 +125,7 @@ void check_finite(const Image& image, const std::string& place) {
   }
 }
 
-/// Sees each mask of a frame as it is read, before it is reduced: of the human (0), then of each object.
+/// Sees each mask of a frame as it is read, before it is reduced, in the order of ClipVideo.
 using MaskLook = std::function<void(std::size_t mask, const Image& image)>;
 
 /// A mask that is as large as the frame of the video, in the camera's size; empty where there is none.
@@ -130,7 +148,9 @@ void straighten(const ClipVideo& video, ClipFrame& frame) {
   frame.target = std::move(straight.image);
   frame.seen = std::move(straight.seen);
   frame.human_mask = straightened(frame.human_mask, through, video.lens).image;
-  for (Image& mask : frame.object_masks) mask = straightened(mask, through, video.lens).image;
+  for (auto* masks : {&frame.object_masks, &frame.other_masks}) {
+    for (Image& mask : *masks) mask = straightened(mask, through, video.lens).image;
+  }
 }
 
 /// As read_frame.
@@ -146,8 +166,10 @@ ClipFrame read_looking(const ClipVideo& video, const Camera& camera, Index index
   check_finite(colors, frames.place(index));
   frame.target = reduced(colors, camera);
   frame.human_mask = read_mask(0, video, camera, index, read, look);
-  for (std::size_t m = 1; m < video.masks.size(); ++m)
-    frame.object_masks.push_back(read_mask(m, video, camera, index, read, look));
+  for (std::size_t m = 1; m < video.masks.size(); ++m) {
+    std::vector<Image>& masks = m + video.others < video.masks.size() ? frame.object_masks : frame.other_masks;
+    masks.push_back(read_mask(m, video, camera, index, read, look));
+  }
   if (!video.lens.is_straight()) straighten(video, frame);
   return frame;
 }
@@ -241,6 +263,8 @@ ClipVideo open_video(const DataSettings& data, const std::vector<std::string>& o
   ClipVideo video{{data.frames, {data.video_rate, data.frame_rate}}, {}};
   video.masks.push_back(open_masks(data.masks, kHumanMasks, video.frames));
   for (const std::string& name : objects) video.masks.push_back(open_masks(data.masks, name, video.frames));
+  for (const auto& [name, person] : data.people) video.masks.push_back(open_masks(data.masks, name, video.frames));
+  video.others = data.people.size();
   return video;
 }
 
@@ -257,15 +281,19 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   clip.frame_files = video->frames.names();
   clip.camera = first_camera(data.camera, video->frames);
   clip.scene = std::move(setup.scene);
-  clip.avatar = std::move(setup.avatar);
   clip.objects = std::move(setup.objects);
   clip.antialiased = std::move(setup.antialiased);
   clip.first.camera_from_world = clip.camera.camera_from_world;
   clip.first.objects = setup.poses;
   clip.video = video;
-  clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
+  take_person(data, setup, video->frames, clip);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
-  if (!data.keypoints.empty()) clip.keypoints = read_keypoints(data, video->frames);
+  for (std::size_t p = 0; p < data.people.size(); ++p) {
+    const auto& [name, person] = data.people[p];
+    clip.others.emplace_back().name = name;
+    take_person(data_of_person(data, person), setup.others.at(p), video->frames, clip.others.back());
+    clip.first.others.push_back(setup.others[p].motion.poses.front());
+  }
   if (!data.tracks.empty()) clip.tracks = read_point_tracks(data, video->frames);
   if (!data.depth_maps.empty()) clip.depth_maps = find_depth_maps(data, video->frames);
   if (!data.contacts.empty()) clip.contacts = read_contacts(data.contacts.string(), {names, clip.frames()});
@@ -273,14 +301,12 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   if (!data.lens.estimate_k1) set_lens(data.lens.lens, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);
-  clip.betas = setup.motion.betas;
-  clip.gender = setup.motion.gender;
   if (is_there(data.surface, "surface", "penetration is not measured")) {
     clip.surface = read_mesh_distance(data.surface.string(), kMeasuredThickness);
     clip.surface_file = data.surface.filename().string();
   }
   if (is_there(data.truth, "truth", "the result is not compared with the truth"))
-    clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
+    clip.truth = read_truth(data.truth, names, clip, video->frames);
   clip.files = {{"/data/scene", data.scene},
                 {"/data/avatar", data.avatar},
                 {"/data/camera", data.camera},
@@ -295,6 +321,16 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   if (!setup.object_tracks.empty()) clip.files.push_back({"/data/initial: /object_tracks", setup.object_tracks});
   for (const auto& [name, object] : data.objects)
     clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
+  for (std::size_t p = 0; p < data.people.size(); ++p) {
+    const auto& [name, person] = data.people[p];
+    const std::string in = "/data/people/" + name;
+    clip.files.insert(clip.files.end(), {{in + "/avatar", person.avatar},
+                                         {in + "/initial", person.initial},
+                                         {in + "/initial: /motion", setup.others[p].motion_file}});
+    if (!person.motion.empty()) clip.files.push_back({in + "/motion", person.motion});
+    for (const fs::path& file : keypoint_files(person.keypoints))
+      clip.files.push_back({in + "/keypoints: " + file.filename().string(), file});
+  }
   if (!video->frames.file().empty()) clip.files.push_back({"/data/frames", video->frames.file()});
   for (const MaskSource& masks : video->masks) {
     if (masks.is_video()) clip.files.push_back({"masks/" + masks.path().filename().string(), masks.path()});
@@ -309,7 +345,9 @@ void set_lens(const Lens& lens, Clip& clip) {
   video.lens = lens;
   video.camera = clip.camera;
   clip.video = std::make_shared<const ClipVideo>(std::move(video));
-  if (clip.keypoints) straighten(lens, clip.camera, *clip.keypoints);
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    if (clip.person(p).keypoints) straighten(lens, clip.camera, *clip.person(p).keypoints);
+  }
 }
 
 bool fits_camera(const Image& frame, const Camera& camera) {
@@ -318,7 +356,7 @@ bool fits_camera(const Image& frame, const Camera& camera) {
 
 void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses) {
   if (clip.depth_maps) check_depth_maps(*clip.depth_maps, clip.camera);
-  std::vector<std::vector<float>> largest(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
+  std::vector<std::vector<float>> largest(static_cast<std::size_t>(clip.frames()));  // [frame][mask]
   std::vector<std::vector<std::vector<int>>> greys(clip.video->masks.size(),
                                                    std::vector<std::vector<int>>(largest.size()));  // [mask][frame]
   const auto look = [&](Index begin, Index end) {
@@ -328,7 +366,9 @@ void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMa
       const ClipFrame frame = read_looking(*clip.video, clip.camera, index,
                                            [&](std::size_t m, const Image& mask) { greys[m][t] = label_greys(mask); });
       of_frame.push_back(largest_value(frame.human_mask));
-      for (const Image& mask : frame.object_masks) of_frame.push_back(largest_value(mask));
+      for (const auto* masks : {&frame.object_masks, &frame.other_masks}) {
+        for (const Image& mask : *masks) of_frame.push_back(largest_value(mask));
+      }
     }
   };
   const bool has_videos =
@@ -357,6 +397,8 @@ void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMa
   warn_if_hidden(0, kHumanMasks, "the human", losses.human);
   for (std::size_t o = 0; o < clip.objects.size(); ++o)
     warn_if_hidden(1 + o, clip.objects[o].name, "the object", losses.objects);
+  for (std::size_t p = 0; p < clip.others.size(); ++p)
+    warn_if_hidden(1 + clip.objects.size() + p, clip.others[p].name, "the person", losses.human);
 }
 
 std::string frame_ranges(const std::vector<Index>& frames) {

@@ -32,28 +32,35 @@ struct ClipFile {
 /// Pictures of the clip.
 struct ClipVideo {
   FrameSource frames;
-  std::vector<MaskSource> masks;  ///< of the human, then of each object
+  std::vector<MaskSource> masks;  ///< of the human, then of each object, then of the people beside the first one
+  std::size_t others = 0;         ///< how many these are
   Lens lens = {};                 ///< through which it was filmed
   Camera camera = {};             ///< whose intrinsics the lens goes with, where it bends
 };
 
-/// All that stays the same over the clip. Frames are read one by one (read_frame).
-struct Clip {
+/// A person in the clip.
+struct ClipPerson {
+  std::string name = kHumanMasks;  ///< of the folder of masks
+  Avatar avatar;
+  std::optional<BodyModel> body;       ///< that the avatar was made on, where a loss asks for it
+  std::vector<BodyPose> estimate;      ///< estimated poses by frame; empty: none
+  std::optional<Keypoints> keypoints;  ///< of data.keypoints
+  std::vector<double> betas;           ///< of the person, as the motion file says; empty: not known
+  std::string gender = "neutral";      ///< of the body model, likewise
+};
+
+/// All that stays the same over the clip, whose own person is the first. Frames are read one by one (read_frame).
+struct Clip : ClipPerson {
   Gaussians scene;
   std::vector<ClipObject> objects;
-  Avatar avatar;
-  std::optional<BodyModel> body;                          ///< that the avatar was made on, where a loss asks for it
+  std::vector<ClipPerson> others;                         ///< of data.people, in their order
   std::optional<AvatarDirections> directions;             ///< how the avatar follows betas, where a stage moves them
   Camera camera;                                          ///< of frame 0; size and intrinsics of all frames
-  SceneState first;                                       ///< state of frame 0, given; poses are of the avatar's body
-  std::vector<BodyPose> estimate;                         ///< estimated poses by frame; empty: none
+  SceneState first;                                       ///< state of frame 0, given; poses are of the avatars' bodies
   std::vector<std::vector<ObjectPose>> object_estimate;   ///< estimated poses [frame][object]; empty: none
-  std::optional<Keypoints> keypoints;                     ///< of data.keypoints
   std::optional<PointTracks> tracks;                      ///< of data.tracks
   std::optional<DepthMaps> depth_maps;                    ///< of data.depth_maps
   std::optional<std::vector<AnnotatedContact>> contacts;  ///< of data.contacts
-  std::vector<double> betas;                              ///< of the person, as the motion file says; empty: not known
-  std::string gender = "neutral";                         ///< of the body model, likewise
   double frame_rate = 10;                                 ///< frames a second
   std::vector<std::string> frame_files;                   ///< names of the frames, in order
   std::shared_ptr<const ClipVideo> video;                 ///< what read_frame reads
@@ -64,19 +71,25 @@ struct Clip {
   std::vector<ClipFile> files;           ///< read for it, but for the truth, which no result depends on
 
   Index frames() const { return static_cast<Index>(frame_files.size()); }
+  std::size_t people() const { return 1 + others.size(); }
+  ClipPerson& person(std::size_t p) { return p == 0 ? *this : others.at(p - 1); }
+  const ClipPerson& person(std::size_t p) const { return p == 0 ? *this : others.at(p - 1); }
 };
 
 /// One frame of the video.
 struct ClipFrame {
-  Image target;                     ///< [3,H,W]
-  Image human_mask;                 ///< [1,H,W] coverage
-  std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
-  DepthMap depth_map = {};          ///< empty where there is none
-  Image seen = {};                  ///< [1,H,W] 1, or 0 where a lens shows nothing of the frame; empty: 1 everywhere
+  Image target;                      ///< [3,H,W]
+  Image human_mask;                  ///< [1,H,W] coverage
+  std::vector<Image> object_masks;   ///< [1,H,W] coverage, by object
+  std::vector<Image> other_masks{};  ///< [1,H,W] coverage, of the people beside the first one
+  DepthMap depth_map = {};           ///< empty where there is none
+  Image seen = {};                   ///< [1,H,W] 1, or 0 where a lens shows nothing of the frame; empty: 1 everywhere
+
+  const Image& person_mask(std::size_t p) const { return p == 0 ? human_mask : other_masks.at(p - 1); }
 };
 
-/// Opens the frames and masks that `data` names. What masks lack or have too much is told in the log. Throws as
-/// FrameSource and MaskSource; DataError for masks with names that are not those of frames.
+/// Opens the frames and masks that `data` names, those of data.people too. What masks lack or have too much is told in
+/// the log. Throws as FrameSource and MaskSource; DataError for masks with names that are not those of frames.
 /// @param objects  names, in order
 ClipVideo open_video(const DataSettings& data, const std::vector<std::string>& objects);
 

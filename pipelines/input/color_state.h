@@ -13,20 +13,21 @@
 
 namespace hsi4d {
 
-/// The color net of a run, if it has one, and what its optimisers have accumulated, which persists as it does.
+/// The color nets of a run, if it has some, and what their optimisers have accumulated, which persists as they do.
 struct ColorState {
-  std::optional<ColorNet> net;
-  AdamState moments;  ///< of the groups color_net and avatar_features; without blocks until a stage moves them
+  std::vector<ColorNet> nets;  ///< by person; empty: the avatars' own colours
+  AdamState moments;           ///< of the groups color_net and avatar_features; without blocks until a stage moves them
   /// What bfgs has learnt of the curvature, by stage, where optimizer.keep_curvature asks for it;
   /// empty: nothing yet.
   std::map<std::string, std::vector<double>, std::less<>> curvature = {};
 };
 
-/// A run's start. @param net  nothing for a run without
-ColorState first_color_state(std::optional<ColorNet> net);
+/// A run's start. @param nets  none for a run without
+ColorState first_color_state(std::vector<ColorNet> nets);
 
-/// Puts network and moments into a checkpoint, as "color_net/...", and curvatures as "curvature/STAGE". Features are in
-/// it once they have moved: else they are those of the start.
+/// Puts networks and moments into a checkpoint, as "color_net/...", those of the person beside the first one as
+/// "color_net_1/..." and so on, and curvatures as "curvature/STAGE". Features are in it once they have moved: else they
+/// are those of the start.
 void store_color_state(const ColorState& state, Checkpoint& checkpoint);
 
 /// What store_color_state put there, bit for bit.

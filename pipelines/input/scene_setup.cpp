@@ -90,6 +90,33 @@ std::optional<ObjectJoint> joint_of(const JointSettings& settings, const ObjectP
   return joint;
 }
 
+/// A person whose motion `initial` names.
+SetupPerson read_person(const InitialSettings& initial, Avatar avatar) {
+  SetupPerson person{std::move(avatar), {}, initial.motion};
+  person.motion = read_motion_for(initial.motion.string(), person.avatar);
+  if (person.motion.poses.empty()) throw DataError(initial.motion.string() + ": holds no frames");
+  check_begins_with_frame_0(person.motion, initial.motion.string(),
+                            "the exact state of frame 0 is needed (an estimate belongs in data.motion)");
+  return person;
+}
+
+Avatar read_clip_avatar(const DataSettings& data) {
+  Avatar avatar = read_avatar(data.avatar.string());
+  if (avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
+    throw DataError(data.avatar.string() + ": has " + std::to_string(avatar.parents.size()) +
+                    " joints; a run needs the " + std::to_string(kSmplxJoints) + " of SMPL-X");
+  }
+  return avatar;
+}
+
+/// One of data.people.
+SetupPerson read_other(const DataSettings& data) {
+  const InitialSettings initial = read_initial(data.initial);
+  if (!initial.objects.empty() || !initial.object_tracks.empty())
+    throw DataError(data.initial.string() + ": is of a person beside the first one; objects belong in data.initial");
+  return read_person(initial, read_clip_avatar(data));
+}
+
 }  // namespace
 
 Gaussians read_object(const fs::path& file) { return centred(read_gaussians(file).gaussians); }
@@ -99,11 +126,7 @@ fs::path initial_motion_file(const DataSettings& data) { return read_initial(dat
 SceneSetup read_scene_setup(const DataSettings& data) {
   SceneSetup setup;
   setup.scene = take_gaussians(read_gaussians(data.scene), data.scene, setup.antialiased);
-  setup.avatar = read_avatar(data.avatar.string());
-  if (setup.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
-    throw DataError(data.avatar.string() + ": has " + std::to_string(setup.avatar.parents.size()) +
-                    " joints; a run needs the " + std::to_string(kSmplxJoints) + " of SMPL-X");
-  }
+  Avatar avatar = read_clip_avatar(data);
   const InitialSettings initial = read_initial(data.initial);
   for (const auto& [name, object] : data.objects) {
     const ObjectPose pose = initial_pose(initial, name, data.initial);
@@ -113,12 +136,9 @@ SceneSetup read_scene_setup(const DataSettings& data) {
         {name, centred(take_gaussians(std::move(read), object.gaussians, setup.antialiased)), joint});
     setup.poses.push_back(pose);
   }
-  setup.motion_file = initial.motion;
   setup.object_tracks = initial.object_tracks;
-  setup.motion = read_motion_for(initial.motion.string(), setup.avatar);
-  if (setup.motion.poses.empty()) throw DataError(initial.motion.string() + ": holds no frames");
-  check_begins_with_frame_0(setup.motion, initial.motion.string(),
-                            "the exact state of frame 0 is needed (an estimate belongs in data.motion)");
+  static_cast<SetupPerson&>(setup) = read_person(initial, std::move(avatar));
+  for (const auto& [name, person] : data.people) setup.others.push_back(read_other(data_of_person(data, person)));
   return setup;
 }
 

@@ -22,14 +22,20 @@ struct ClipObject {
   std::optional<ObjectJoint> joint = {};  ///< none: it moves freely
 };
 
-struct SceneSetup {
-  Gaussians scene;
-  std::vector<ClipObject> objects;
-  std::vector<ObjectPose> poses;  ///< of the objects in frame 0
+/// One person.
+struct SetupPerson {
   Avatar avatar;
-  std::vector<std::string> antialiased;  ///< files that say that their Gaussians were trained with antialiasing
   Motion motion;  ///< of the avatar's body: frame 0 exact, the others, where there are any, estimates
   std::filesystem::path motion_file;
+};
+
+/// Its own person is the first.
+struct SceneSetup : SetupPerson {
+  Gaussians scene;
+  std::vector<ClipObject> objects;
+  std::vector<ObjectPose> poses;         ///< of the objects in frame 0
+  std::vector<SetupPerson> others{};     ///< of data.people, in their order
+  std::vector<std::string> antialiased;  ///< files that say that their Gaussians were trained with antialiasing
   std::filesystem::path
       object_tracks;  ///< estimated poses of the objects, NAME/rotation and NAME/translation; may be empty
 };
@@ -41,8 +47,8 @@ Gaussians read_object(const std::filesystem::path& file);
 /// The motion that data.initial names. Throws UserError naming what is wrong with that file.
 std::filesystem::path initial_motion_file(const DataSettings& data);
 
-/// Reads data.scene, avatar, objects and initial. Throws UserError or DataError naming the file: missing, damaged,
-/// without what is needed of it.
+/// Reads data.scene, avatar, objects, people and initial. Throws UserError or DataError naming the file: missing,
+/// damaged, without what is needed of it.
 SceneSetup read_scene_setup(const DataSettings& data);
 
 }  // namespace hsi4d

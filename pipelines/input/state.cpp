@@ -117,10 +117,18 @@ std::vector<PlaceSigmas> read_place_sigmas(const std::string& motion, const std:
   return sigmas;
 }
 
-std::vector<BodyPose> bodies_of(const std::vector<SceneState>& frames) {
+std::vector<BodyPose> bodies_of(const std::vector<SceneState>& frames, std::size_t person) {
   std::vector<BodyPose> bodies;
-  for (const SceneState& frame : frames) bodies.push_back(frame.body);
+  for (const SceneState& frame : frames) bodies.push_back(frame.person(person));
   return bodies;
+}
+
+std::vector<SceneState> with_person(std::vector<SceneState> frames, std::size_t person) {
+  for (SceneState& frame : frames) {
+    if (person > 0) frame.body = frame.person(person);
+    frame.others.clear();
+  }
+  return frames;
 }
 
 std::vector<Camera> cameras_of(const std::vector<SceneState>& frames, const Camera& camera) {

@@ -25,7 +25,12 @@ ObjectPose pose_of(const Rigid<double>& world_from_object);
 struct SceneState {
   Rigid<double> camera_from_world;
   std::vector<ObjectPose> objects;  ///< in the clip's order
-  BodyPose body;
+  BodyPose body;                    ///< of the clip's first person
+  std::vector<BodyPose> others{};   ///< of the people beside it, in the clip's order
+
+  std::size_t people() const { return 1 + others.size(); }
+  BodyPose& person(std::size_t p) { return p == 0 ? body : others.at(p - 1); }
+  const BodyPose& person(std::size_t p) const { return p == 0 ? body : others.at(p - 1); }
 };
 
 /// How sure a place is in the axes of its frame's camera: one standard deviation, metres. Infinite: nothing tells it;
@@ -74,7 +79,10 @@ std::vector<PlaceSigmas> read_place_sigmas(const std::string& motion, const std:
 std::vector<std::vector<ObjectPose>> read_object_tracks(const std::string& path, const std::vector<std::string>& names);
 
 /// The bodies of the frames.
-std::vector<BodyPose> bodies_of(const std::vector<SceneState>& frames);
+std::vector<BodyPose> bodies_of(const std::vector<SceneState>& frames, std::size_t person = 0);
+
+/// The frames with one person alone, who is the first in them.
+std::vector<SceneState> with_person(std::vector<SceneState> frames, std::size_t person);
 
 /// The cameras of the frames, with the intrinsics of `camera`.
 std::vector<Camera> cameras_of(const std::vector<SceneState>& frames, const Camera& camera);

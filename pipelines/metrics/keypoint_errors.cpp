@@ -32,8 +32,10 @@ double extent_of(const std::vector<Keypoint>& found, const Camera& camera) {
   return (high - low).maxCoeff();
 }
 
-MetricValues errors_of(const Clip& clip, const std::vector<Keypoint>& found, const SceneState& state) {
-  const std::vector<double> joints = pose_joints(clip.avatar.parents, clip.avatar.joints, state.body);
+MetricValues errors_of(const Clip& clip, std::size_t person, const std::vector<Keypoint>& found,
+                       const SceneState& state) {
+  const Avatar& avatar = clip.person(person).avatar;
+  const std::vector<double> joints = pose_joints(avatar.parents, avatar.joints, state.body);
   Camera camera = clip.camera;
   camera.camera_from_world = state.camera_from_world;
   const double extent = extent_of(found, camera);
@@ -41,7 +43,7 @@ MetricValues errors_of(const Clip& clip, const std::vector<Keypoint>& found, con
   for (std::size_t k = 0; k < found.size(); ++k) {
     if (found[k].confidence < kFoundConfidence) continue;
     const double distance =
-        (seen_point(clip.keypoints->joints[k], joints, camera) - target_of(found[k], camera)).norm();
+        (seen_point(clip.person(person).keypoints->joints[k], joints, camera) - target_of(found[k], camera)).norm();
     sum += distance;
     near += distance < kPckShare * extent ? 1 : 0;
     ++count;
@@ -54,10 +56,12 @@ MetricValues errors_of(const Clip& clip, const std::vector<Keypoint>& found, con
 
 }  // namespace
 
-std::vector<MetricValues> keypoint_errors_by_frame(const Clip& clip, const std::vector<SceneState>& states) {
+std::vector<MetricValues> keypoint_errors_by_frame(const Clip& clip, const std::vector<SceneState>& states,
+                                                   std::size_t person) {
   std::vector<MetricValues> all(states.size());
-  for (std::size_t t = 0; clip.keypoints && t < states.size(); ++t)
-    all[t] = errors_of(clip, clip.keypoints->frames.at(t), states[t]);
+  const std::optional<Keypoints>& keypoints = clip.person(person).keypoints;
+  for (std::size_t t = 0; keypoints && t < states.size(); ++t)
+    all[t] = errors_of(clip, person, keypoints->frames.at(t), states[t]);
   return all;
 }
 

@@ -16,6 +16,7 @@
 #include "core/log.h"
 #include "core/types.h"
 #include "optim/gradient_shares.h"
+#include "pipelines/config/data_settings.h"
 #include "pipelines/record/summary.h"
 
 namespace hsi4d {
@@ -62,6 +63,8 @@ struct RunPaths {
   std::string metrics() const { return member("metrics.jsonl"); }
   std::string summary() const { return member("summary.json"); }
   std::string motion() const { return member("motion.npz"); }
+  /// That of a person beside the first one.
+  std::string motion_of(const std::string& person) const { return (folder / motion_file_of(person)).string(); }
   std::string motion_at_30() const { return member("motion_30fps.npz"); }
   std::string body() const { return member("body.glb"); }
   std::string avatar() const { return member("avatar.safetensors"); }
@@ -70,6 +73,9 @@ struct RunPaths {
   std::string objects() const { return member("objects.npz"); }
   std::string cameras() const { return member("cameras.json"); }
   std::string color_net() const { return member("color_net.safetensors"); }
+  std::string color_net_of(const std::string& person) const {
+    return member(("color_net_of_" + person + ".safetensors").c_str());
+  }
   std::string report() const { return member("report.html"); }
   std::string tensorboard() const { return member("tensorboard"); }
   std::string frames() const { return member("frames"); }

@@ -145,11 +145,12 @@ bool moves_colors(const RunConfig& config) {
   });
 }
 
-Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
-  Motion motion{clip.frame_rate, bodies_of(states)};
-  motion.pelvis_rest = pelvis_of(clip.avatar.joints);
-  motion.betas = clip.betas;
-  motion.gender = clip.gender;
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states, std::size_t person) {
+  const ClipPerson& who = clip.person(person);
+  Motion motion{clip.frame_rate, bodies_of(states, person)};
+  motion.pelvis_rest = pelvis_of(who.avatar.joints);
+  motion.betas = who.betas;
+  motion.gender = who.gender;
   return motion;
 }
 
@@ -177,9 +178,12 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
   const Motion motion = motion_of(clip, states);
   write_motion(paths.motion(), motion, joint_sigmas_of(sigmas));
   write_motion(paths.motion_at_30(), resampled(motion, kExportedRate));
+  for (std::size_t p = 1; p < clip.people(); ++p)
+    write_motion(paths.motion_of(clip.person(p).name), motion_of(clip, states, p));
   if (!names.empty()) write_object_tracks(paths.objects(), names, states, sigmas, joint_tracks(clip, states));
   write_cameras(paths.cameras(), cameras_of(states, clip.camera));
-  if (colors.net && moves_colors(config)) write_color_net(paths.color_net(), *colors.net);
+  for (std::size_t p = 0; moves_colors(config) && p < colors.nets.size(); ++p)
+    write_color_net(p == 0 ? paths.color_net() : paths.color_net_of(clip.person(p).name), colors.nets[p]);
 }
 
 std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& settings, const Avatar& avatar,

@@ -27,7 +27,7 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
                    const std::vector<PlaceSigmas>& sigmas = {});
 
 /// The bodies of the frames as motion.npz has them.
-Motion motion_of(const Clip& clip, const std::vector<SceneState>& states);
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states, std::size_t person = 0);
 
 /// Writes body.glb, the body in motion. It has to be the avatar's: of its kind, and with joints where the avatar has
 /// them. Where it is another the log says so, and no file is written.

@@ -76,6 +76,26 @@ ConfigValue quality_json(const std::vector<QualityGate>& gates) {
   return object;
 }
 
+ConfigValue values_json(const MetricValues& values, const std::string& pointer) {
+  ConfigValue object = ConfigValue::make_object();
+  add_values(object, pointer, values);
+  return object;
+}
+
+ConfigValue people_json(const std::vector<PersonSummary>& people) {
+  ConfigValue object = ConfigValue::make_object();
+  for (const PersonSummary& person : people) {
+    const std::string place = child_pointer("/people", person.name);
+    ConfigValue of_person = ConfigValue::make_object();
+    of_person.add("start", values_json(person.start, place + "/start"));
+    of_person.add("result", values_json(person.result, place + "/result"));
+    if (!person.per_frame.empty())
+      of_person.add("per_frame", frames_json(person.per_frame, child_pointer(place, "per_frame")));
+    object.add(person.name, std::move(of_person));
+  }
+  return object;
+}
+
 // ---- Reading ----
 
 /// Every number of an object but those named in `taken`; null (a gap) and other kinds are passed over.
@@ -168,6 +188,25 @@ StartSummary read_start(const ConfigValue& value) {
   return start;
 }
 
+std::vector<PersonSummary> read_people(const ConfigValue& value) {
+  check_kind(value, Kind::kObject, "/people");
+  std::vector<PersonSummary> people;
+  for (const ConfigMember& member : value.members) {
+    const std::string place = child_pointer("/people", member.key);
+    check_kind(member.value, Kind::kObject, place);
+    PersonSummary& person = people.emplace_back(PersonSummary{member.key, {}, {}});
+    for (const auto& [key, values] : {std::pair{"start", &person.start}, std::pair{"result", &person.result}}) {
+      const ConfigValue* const found = find_member(member.value, key);
+      if (found == nullptr) continue;
+      check_kind(*found, Kind::kObject, child_pointer(place, key));
+      *values = read_values(*found, child_pointer(place, key), {});
+    }
+    if (const ConfigValue* const frames = find_member(member.value, "per_frame"))
+      person.per_frame = read_frames(*frames, child_pointer(place, "per_frame"));
+  }
+  return people;
+}
+
 /// Gates of metrics that are not known are passed over.
 std::vector<QualityGate> read_quality(const ConfigValue& value) {
   check_kind(value, Kind::kObject, "/quality");
@@ -205,6 +244,7 @@ std::string summary_json(const RunSummary& summary) {
     tree.add("found", std::move(found));
   }
   if (!summary.quality.empty()) tree.add("quality", quality_json(summary.quality));
+  if (!summary.people.empty()) tree.add("people", people_json(summary.people));
   ConfigValue means = ConfigValue::make_object(), by_frame = ConfigValue::make_object();
   for (const Baseline& baseline : summary.baselines) {
     const std::string place = child_pointer("/baselines", baseline.name);
@@ -251,6 +291,7 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
       summary.found.emplace_back(member.key, read_number(*found, "/found", member.key));
   }
   if (const ConfigValue* const quality = find_member(tree, "quality")) summary.quality = read_quality(*quality);
+  if (const ConfigValue* const people = find_member(tree, "people")) summary.people = read_people(*people);
   read_baselines(tree, summary);
   if (const ConfigValue* const frames = find_member(tree, "per_frame"))
     summary.per_frame = read_frames(*frames, "/per_frame");
@@ -285,9 +326,27 @@ Table error_table(const RunSummary& summary) {
   return table;
 }
 
+Table people_table(const RunSummary& summary) {
+  Table table{.head = {""}, .align = "lr"};
+  std::vector<const MetricValues*> sources;
+  for (const PersonSummary& person : summary.people) {
+    table.head.emplace_back(person.name + ", start", "baseline");
+    table.head.emplace_back(person.name);
+    sources.insert(sources.end(), {&person.start, &person.result});
+  }
+  for (const MetricFacts& facts : metric_facts()) {
+    std::vector<Cell> row = metric_row(facts, sources);
+    if (row.empty()) continue;
+    for (std::size_t i = 1; i + 1 < row.size(); i += 2) mark_best(facts.better, {&row[i], &row[i + 1]});
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
 std::string error_text(const RunSummary& summary) {
-  const Table table = error_table(summary);
-  return table.rows.empty() ? "no errors were measured\n" : table_text(table);
+  const Table table = error_table(summary), people = people_table(summary);
+  if (table.rows.empty()) return "no errors were measured\n";
+  return table_text(table) + (people.rows.empty() ? "" : "\n" + table_text(people));
 }
 
 }  // namespace hsi4d

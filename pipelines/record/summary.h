@@ -39,6 +39,14 @@ struct Baseline {
   bool of_frame_0 = false;              ///< the errors are those of frame 0 alone
 };
 
+/// A person beside the first one (data.people): errors, contact and jitter, means over the frames.
+struct PersonSummary {
+  std::string name;
+  MetricValues start;  ///< of what the run was given
+  MetricValues result;
+  std::vector<FrameMetrics> per_frame = {};  ///< errors of the result; may be empty
+};
+
 /// How often a part of the state began a frame with which of its starts, where the best of them is taken.
 struct StartCounts {
   std::string part;                                  ///< "pose", "root" or "objects"
@@ -63,6 +71,7 @@ struct RunSummary {
   StartSummary start;
   MetricValues found;  ///< of the clip, by stages over the first frame: "focal_length_px", "object_scale_vase", …
   std::vector<Baseline> baselines;
+  std::vector<PersonSummary> people;    ///< beside the first one, whose errors are those of `metrics`
   std::vector<FrameMetrics> per_frame;  ///< of the result
   std::vector<QualityGate> quality;     ///< of the result; may be empty
 };
@@ -74,9 +83,10 @@ struct RunSummary {
 ///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
 ///    "start": {"seconds", PART: {START: FRAMES...}...}, "found": {NAME: NUMBER...},
 ///    "quality": {NAME: {"value", "word", "pass", "check"}...},
+///    "people": {NAME: {"start": {NAME: NUMBER...}, "result": {NAME: NUMBER...}, "per_frame": as below}...},
 ///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
 ///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "plate", "surface", "start",
-///    "found", "quality" and "gradient_shares" only where there are any)
+///    "found", "quality", "people" and "gradient_shares" only where there are any)
 ///
 /// with "frame": 0 where errors are those of frame 0 alone.
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and
@@ -93,7 +103,11 @@ RunSummary parse_summary(const std::string& text, const std::string& name);
 /// baselines first, then stages. The best of a row is marked; errors of frame 0 alone are compared with each other.
 Table error_table(const RunSummary& summary);
 
-/// The table of errors for a terminal, or that there are none.
+/// The same of the people beside the first one, two columns each: what they began with, and the result. Empty where
+/// there are none.
+Table people_table(const RunSummary& summary);
+
+/// The tables of errors for a terminal, or that there are none.
 std::string error_text(const RunSummary& summary);
 
 }  // namespace hsi4d

@@ -154,6 +154,16 @@ Table with_labels(Table table) {
   return table;
 }
 
+/// The people beside the first one; empty where there are none.
+std::string people_errors(const RunSummary& summary) {
+  Table table = people_table(summary);
+  if (table.rows.empty()) return "";
+  table.head[0] = "error";
+  return "<div class=\"card wide\">" + table_html(with_labels(std::move(table)), "errors") +
+         "</div>\n<p class=\"caption\">The people beside the first one: what they began with, in grey, and the "
+         "result.</p>\n";
+}
+
 std::string errors_section(const ReportData& data) {
   std::string text = "<section id=\"errors\">\n<h2>Errors</h2>\n";
   Table table = data.summary ? error_table(*data.summary) : Table();
@@ -171,7 +181,7 @@ std::string errors_section(const ReportData& data) {
          "</div>\n<p class=\"caption\">Means over the frames that were optimised; columns in grey are "
          "what no optimisation gives, the others the end of each stage. The best of each row is "
          "marked." +
-         of_frame_0 + (of_frame_0.empty() ? "" : ".") + "</p>\n</section>\n";
+         of_frame_0 + (of_frame_0.empty() ? "" : ".") + "</p>\n" + people_errors(*data.summary) + "</section>\n";
 }
 
 // ---- Errors by frame ----

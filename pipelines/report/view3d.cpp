@@ -92,22 +92,26 @@ std::vector<Vector4<double>> world_rotations(const std::vector<int>& parents, co
   return rotations;
 }
 
-void add_body_motion(const std::string& name, const std::vector<int>& parents, const std::vector<SceneState>& states,
+void add_body_motion(const std::string& name, const std::vector<int>& parents, const std::vector<BodyPose>& poses,
                      SafetensorsWriter& file) {
   std::vector<std::int16_t> rotations;
   std::vector<float> translations;
-  for (const SceneState& state : states) {
-    for (const Vector4<double>& q : world_rotations(parents, state.body)) {
+  for (const BodyPose& pose : poses) {
+    for (const Vector4<double>& q : world_rotations(parents, pose)) {
       for (Index i = 0; i < 4; ++i) rotations.push_back(static_cast<std::int16_t>(std::lround(32767 * q[i])));
     }
-    add_numbers(state.body.transl, translations);
+    add_numbers(pose.transl, translations);
   }
-  file.add(name + "/rotations", {std::ssize(states), std::ssize(parents), 4}, rotations);
-  file.add(name + "/translations", {std::ssize(states), 3}, translations);
+  file.add(name + "/rotations", {std::ssize(poses), std::ssize(parents), 4}, rotations);
+  file.add(name + "/translations", {std::ssize(poses), 3}, translations);
+}
+
+void add_joints(const std::string& name, const std::vector<double>& joints, SafetensorsWriter& file) {
+  file.add(name + "/joints", {std::ssize(joints) / 3, 3}, std::vector<float>(joints.begin(), joints.end()));
 }
 
 void add_skeleton(const std::vector<double>& joints, const std::vector<int>& parents, SafetensorsWriter& file) {
-  file.add("skeleton/joints", {std::ssize(parents), 3}, std::vector<float>(joints.begin(), joints.end()));
+  add_joints("skeleton", joints, file);
   file.add("skeleton/parents", {std::ssize(parents)}, std::vector<std::int32_t>(parents.begin(), parents.end()));
 }
 
@@ -189,8 +193,13 @@ SafetensorsWriter view3d_file(const Clip& clip, const std::vector<SceneState>& s
   add_splats(clip, states, file);
   add_objects_and_cameras(clip, states, file);
   add_skeleton(body != nullptr ? body->joints : clip.avatar.joints, clip.avatar.parents, file);
-  add_body_motion("body", clip.avatar.parents, states, file);
-  if (clip.truth) add_body_motion("truth", clip.avatar.parents, *clip.truth, file);
+  add_body_motion("body", clip.avatar.parents, bodies_of(states), file);
+  for (std::size_t p = 1; p < clip.people(); ++p) {
+    const std::string name = "others/" + std::to_string(p);
+    add_joints(name, clip.person(p).avatar.joints, file);
+    add_body_motion(name, clip.person(p).avatar.parents, bodies_of(states, p), file);
+  }
+  if (clip.truth) add_body_motion("truth", clip.avatar.parents, bodies_of(*clip.truth), file);
   if (body != nullptr) add_mesh(*body, file);
   return file;
 }

@@ -29,6 +29,7 @@ inline constexpr Index kMostSceneSplats = 30000, kMostObjectSplats = 6000;
 ///   skeleton/joints F32 [J,3], parents I32 [J]                  in the rest pose
 ///   body/rotations I16 [T,J,4], translations F32 [T,3]          of the joints in the world, quaternions of 32767
 ///   truth/rotations, truth/translations                         the same, where the truth is known
+///   others/N/joints F32 [J,3], rotations, translations          likewise, of people beside the first one, N from 1
 ///   mesh/box F32 [2,3], positions U16 [V,3], faces U16 or U32 [F,3], joints U8 [V,4], weights U8 [V,4]    with a body
 ///
 /// Of a joint's rotation R_j, rest place r_j, parent q and translation t:  p_j = p_q + R_q (r_j − r_q),

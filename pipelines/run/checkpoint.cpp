@@ -118,7 +118,7 @@ std::vector<Entry> names_of(const Checkpoint& checkpoint, const char* key, const
   return entries;
 }
 
-/// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
+/// One state as numbers: camera [R | t] (12), then 6 an object, then each body's transl (3) and axis-angles (165).
 void append(const SceneState& state, std::vector<double>& numbers) {
   for (Index r = 0; r < 3; ++r) {
     for (Index c = 0; c < 3; ++c) numbers.push_back(state.camera_from_world.rotation(r, c));
@@ -128,8 +128,11 @@ void append(const SceneState& state, std::vector<double>& numbers) {
     numbers.insert(numbers.end(), pose.rotation.data(), pose.rotation.data() + 3);
     numbers.insert(numbers.end(), pose.translation.data(), pose.translation.data() + 3);
   }
-  numbers.insert(numbers.end(), state.body.transl.data(), state.body.transl.data() + 3);
-  numbers.insert(numbers.end(), state.body.axis_angle.begin(), state.body.axis_angle.end());
+  for (std::size_t p = 0; p < state.people(); ++p) {
+    const BodyPose& body = state.person(p);
+    numbers.insert(numbers.end(), body.transl.data(), body.transl.data() + 3);
+    numbers.insert(numbers.end(), body.axis_angle.begin(), body.axis_angle.end());
+  }
 }
 
 /// The pixels of a mask, row by row, without what pads its rows.
@@ -146,7 +149,7 @@ void set_pixels(const std::vector<float>& pixels, Image& mask) {
 }
 
 Index numbers_per_state(const Clip& clip) {
-  return kRigidNumbers + 6 * static_cast<Index>(clip.objects.size()) + 3 + kPoseNumbers;
+  return kRigidNumbers + 6 * std::ssize(clip.objects) + static_cast<Index>(clip.people()) * (3 + kPoseNumbers);
 }
 
 SceneState state_from(const double* numbers, const Clip& clip) {
@@ -158,8 +161,11 @@ SceneState state_from(const double* numbers, const Clip& clip) {
   for (std::size_t o = 0; o < clip.objects.size(); ++o, numbers += 6) {
     state.objects.push_back({Vector3<double>(numbers), Vector3<double>(numbers + 3)});
   }
-  state.body.transl = Vector3<double>(numbers);
-  state.body.axis_angle.assign(numbers + 3, numbers + 3 + kPoseNumbers);
+  state.others.resize(clip.others.size());
+  for (std::size_t p = 0; p < clip.people(); ++p, numbers += 3 + kPoseNumbers) {
+    state.person(p).transl = Vector3<double>(numbers);
+    state.person(p).axis_angle.assign(numbers + 3, numbers + 3 + kPoseNumbers);
+  }
   return state;
 }
 
@@ -289,18 +295,20 @@ std::vector<LaterStage> stored_later(const Checkpoint& checkpoint, const Clip& c
   return found;
 }
 
-constexpr const char* kBias = "depth_bias";  // the human's factor, then the objects'
+constexpr const char* kBias = "depth_bias";  // the human's factor, then the objects', then the other people's
 
 void store_bias(const DepthBias& bias, Checkpoint& checkpoint) {
   std::vector<double> factors = {bias.human};
   factors.insert(factors.end(), bias.objects.begin(), bias.objects.end());
+  factors.insert(factors.end(), bias.others.begin(), bias.others.end());
   checkpoint.set(kBias, std::move(factors));
 }
 
 std::optional<DepthBias> stored_bias(const Checkpoint& checkpoint, const Clip& clip) {
   if (!checkpoint.has(kBias)) return {};
-  const std::vector<double>& factors = stored_states(checkpoint, kBias, 1 + clip.objects.size());
-  return DepthBias{factors[0], {factors.begin() + 1, factors.end()}};
+  const std::vector<double>& factors = stored_states(checkpoint, kBias, clip.people() + clip.objects.size());
+  const auto others = factors.begin() + 1 + std::ssize(clip.objects);
+  return DepthBias{factors[0], {factors.begin() + 1, others}, {others, factors.end()}};
 }
 
 // ---- Other entries ----
@@ -394,14 +402,14 @@ const std::vector<SceneState>& result_of(const RunProgress& progress) {
   return progress.later.empty() ? progress.after_stage.back() : progress.later.back().states;
 }
 
-RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net) {
+RunProgress first_progress(const Clip& clip, std::size_t stages, std::vector<ColorNet> nets) {
   RunProgress progress;
   progress.after_stage.assign(stages, {clip.first});
   progress.totals.resize(stages);
   progress.image_errors.resize(1);
   progress.start_errors.resize(1);
   progress.covered = Image(1, clip.camera.height, clip.camera.width);
-  progress.colors = first_color_state(std::move(net));
+  progress.colors = first_color_state(std::move(nets));
   return progress;
 }
 
@@ -439,12 +447,12 @@ void save_progress(const std::string& file, const std::string& config, const Run
 }
 
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
-                          std::optional<ColorNet> net, std::size_t first_stages, std::span<const StageScope> later) {
+                          std::vector<ColorNet> nets, std::size_t first_stages, std::span<const StageScope> later) {
   const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
   const auto expect = [&checkpoint](const char* name, std::size_t found, std::size_t wanted) {
     expect_size(checkpoint, name, found, wanted);
   };
-  RunProgress progress = first_progress(clip, stages, std::move(net));
+  RunProgress progress = first_progress(clip, stages, std::move(nets));
   const std::vector<std::int64_t>& frames = checkpoint.integers("frames");
   expect("frames", frames.size(), 1);
   if (frames[0] < 1 || frames[0] > clip.frames()) {

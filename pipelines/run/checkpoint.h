@@ -92,8 +92,8 @@ const std::vector<SceneState>& result_of(const RunProgress& progress);
 
 /// Nothing done but the given frame 0.
 /// @param stages  how many there are over frames, in the first pass
-/// @param net  with which the run begins, if it has one
-RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
+/// @param nets  with which the run begins, if it has some
+RunProgress first_progress(const Clip& clip, std::size_t stages, std::vector<ColorNet> nets = {});
 
 /// Writes the checkpoint of a run, in one step, with the name of the instruction set of now.
 /// @param config  the text to which the checkpoint belongs: the config, without what no result depends on
@@ -101,11 +101,11 @@ void save_progress(const std::string& file, const std::string& config, const Run
 
 /// Reads it back, bit for bit. Throws DataError naming the file when it is damaged, of another config, or of another
 /// clip.
-/// @param stages, net   as of first_progress
+/// @param stages, nets  as of first_progress
 /// @param first_stages  how many there are over the first frame
 /// @param later         what those are over that come after the first pass through the frames
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
-                          std::optional<ColorNet> net = {}, std::size_t first_stages = 0,
+                          std::vector<ColorNet> nets = {}, std::size_t first_stages = 0,
                           std::span<const StageScope> later = {});
 
 }  // namespace hsi4d

@@ -15,8 +15,8 @@ Vector3<double> camera_center(const SceneState& state) {
 }
 
 /// Where the pelvis is: the body turns about it, and the translation comes last.
-Vector3<double> pelvis_of(const Clip& clip, const SceneState& state) {
-  return Vector3<double>(clip.avatar.joints.data()) + state.body.transl;
+Vector3<double> pelvis_of(const Clip& clip, const SceneState& state, std::size_t person) {
+  return Vector3<double>(clip.person(person).avatar.joints.data()) + state.person(person).transl;
 }
 
 /// Distance along the line of sight of `given`, as a factor.
@@ -34,8 +34,11 @@ DepthBias depth_bias(const Clip& clip, const ClipFrame& frame, double mask_thres
                      const SceneState& fitted) {
   const Vector3<double> center = camera_center(given);
   DepthBias bias;
-  if (is_seen(frame.human_mask, mask_threshold))
-    bias.human = factor_of(center, pelvis_of(clip, given), pelvis_of(clip, fitted));
+  bias.others.resize(clip.others.size(), 1);
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    if (is_seen(frame.person_mask(p), mask_threshold))
+      bias.person(p) = factor_of(center, pelvis_of(clip, given, p), pelvis_of(clip, fitted, p));
+  }
   for (std::size_t o = 0; o < given.objects.size(); ++o) {
     const bool seen = o >= frame.object_masks.size() || is_seen(frame.object_masks[o], mask_threshold);
     bias.objects.push_back(seen ? factor_of(center, given.objects[o].translation, fitted.objects[o].translation) : 1.0);
@@ -48,7 +51,8 @@ void remove_depth_bias(const Clip& clip, const DepthBias& bias, SceneState& stat
   const auto shift = [&](const Vector3<double>& place, double factor) -> Vector3<double> {
     return (place - center) * (1 / factor - 1);
   };
-  state.body.transl += shift(pelvis_of(clip, state), bias.human);
+  for (std::size_t p = 0; p < clip.people(); ++p)
+    state.person(p).transl += shift(pelvis_of(clip, state, p), bias.person(p));
   const std::vector<ObjectPose> before = state.objects;
   for (std::size_t o = 0; o < state.objects.size(); ++o) {
     if (const std::optional<ObjectJoint>& joint = clip.objects[o].joint) {
@@ -66,6 +70,8 @@ std::string depth_bias_text(const Clip& clip, const DepthBias& bias) {
   std::string text = "human " + rounded(bias.human, 6);
   for (std::size_t o = 0; o < bias.objects.size(); ++o)
     text += ", " + clip.objects[o].name + " " + rounded(bias.objects[o], 6);
+  for (std::size_t p = 0; p < bias.others.size(); ++p)
+    text += ", " + clip.others[p].name + " " + rounded(bias.others[p], 6);
   return text;
 }
 

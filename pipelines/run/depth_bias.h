@@ -15,8 +15,12 @@ namespace hsi4d {
 
 /// How much further from the camera a fit puts what moves than it is: factors of the distance along the line of sight.
 struct DepthBias {
-  double human = 1;             ///< of the pelvis
-  std::vector<double> objects;  ///< of the centroids, in the clip's order
+  double human = 1;              ///< of the pelvis
+  std::vector<double> objects;   ///< of the centroids, in the clip's order
+  std::vector<double> others{};  ///< of the other people's pelvises, likewise
+
+  double& person(std::size_t p) { return p == 0 ? human : others.at(p - 1); }
+  double person(std::size_t p) const { return p == 0 ? human : others.at(p - 1); }
 };
 
 /// A fit that is further off than this has lost what it followed, and tells nothing: its factor is 1.
@@ -27,7 +31,7 @@ inline constexpr double kMostDepthBias = 0.05;
 DepthBias depth_bias(const Clip& clip, const ClipFrame& frame, double mask_threshold, const SceneState& given,
                      const SceneState& fitted);
 
-/// Moves human and objects along their lines of sight to where they are without it. Objects on joints stay on these.
+/// Moves people and objects along their lines of sight to where they are without it. Objects on joints stay on these.
 void remove_depth_bias(const Clip& clip, const DepthBias& bias, SceneState& state);
 
 /// "human 1.0027, vase 1.0012"

@@ -30,13 +30,20 @@ Rigid<double> continued(const Rigid<double>& a, const Rigid<double>& b) {
   return next;
 }
 
-void start_joints(StartFrom from, Index first, Index count, const SceneState* before, const BodyPose* estimate,
-                  SceneState& state) {
+void start_joints(StartFrom from, Index first, Index count, const BodyPose* before, const BodyPose* estimate,
+                  BodyPose& body) {
   for (Index j = first; j < first + count; ++j) {
-    if (from == StartFrom::kEstimate && estimate != nullptr) state.body.set_rotation(j, estimate->rotation_of(j));
+    if (from == StartFrom::kEstimate && estimate != nullptr) body.set_rotation(j, estimate->rotation_of(j));
     if (from == StartFrom::kVelocity && before != nullptr)
-      state.body.set_rotation(j, continued_rotation(before->body.rotation_of(j), state.body.rotation_of(j)));
+      body.set_rotation(j, continued_rotation(before->rotation_of(j), body.rotation_of(j)));
   }
+}
+
+void start_body(const StartSettings& settings, const BodyPose* before, const BodyPose* estimate, BodyPose& body) {
+  start_joints(settings.root, 0, 1, before, estimate, body);
+  start_joints(settings.pose, 1, kSmplxJoints - 1, before, estimate, body);
+  if (settings.root == StartFrom::kEstimate && estimate != nullptr) body.transl = estimate->transl;
+  if (settings.root == StartFrom::kVelocity && before != nullptr) body.transl = continued(before->transl, body.transl);
 }
 
 void start_objects(StartFrom from, const SceneState* before, const std::vector<ObjectPose>* estimate,
@@ -62,8 +69,11 @@ void put_on_joints(const Clip& clip, std::vector<ObjectPose>& objects) {
 }  // namespace
 
 void check_start(const StartSettings& settings, const Clip& clip) {
-  if (settings.root == StartFrom::kEstimate && clip.estimate.empty())
-    throw UserError("/start/root: \"estimate\": data.initial names a motion of frame 0 alone");
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    const std::string in = p == 0 ? "data" : "data.people." + clip.person(p).name;
+    if (settings.root == StartFrom::kEstimate && clip.person(p).estimate.empty())
+      throw UserError("/start/root: \"estimate\": " + in + ".initial names a motion of frame 0 alone");
+  }
   if (settings.objects == StartFrom::kEstimate && !clip.objects.empty() && clip.object_estimate.empty())
     throw UserError("/start/objects: \"estimate\": data.initial names no object_tracks");
 }
@@ -71,7 +81,9 @@ void check_start(const StartSettings& settings, const Clip& clip) {
 SceneState given_start(const Clip& clip, Index frame) {
   const auto index = static_cast<std::size_t>(frame);
   SceneState state = clip.first;
-  if (!clip.estimate.empty()) state.body = clip.estimate[index];
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    if (!clip.person(p).estimate.empty()) state.person(p) = clip.person(p).estimate[index];
+  }
   if (!clip.object_estimate.empty()) {
     state.objects = clip.object_estimate[index];
     put_on_joints(clip, state.objects);
@@ -83,12 +95,11 @@ SceneState frame_start(const StartSettings& settings, const Clip& clip, const st
   const std::size_t index = done.size();
   SceneState state = done.back();
   const SceneState* const before = index > 1 ? &done[index - 2] : nullptr;
-  const BodyPose* const body = clip.estimate.empty() ? nullptr : &clip.estimate[index];
-  start_joints(settings.root, 0, 1, before, body, state);
-  start_joints(settings.pose, 1, kSmplxJoints - 1, before, body, state);
-  if (settings.root == StartFrom::kEstimate && body != nullptr) state.body.transl = body->transl;
-  if (settings.root == StartFrom::kVelocity && before != nullptr)
-    state.body.transl = continued(before->body.transl, state.body.transl);
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    const std::vector<BodyPose>& estimate = clip.person(p).estimate;
+    start_body(settings, before != nullptr ? &before->person(p) : nullptr,
+               estimate.empty() ? nullptr : &estimate[index], state.person(p));
+  }
   start_objects(settings.objects, before, clip.object_estimate.empty() ? nullptr : &clip.object_estimate[index], state);
   if (settings.objects != StartFrom::kPrevious) put_on_joints(clip, state.objects);
   if (settings.camera == StartFrom::kVelocity && before != nullptr)

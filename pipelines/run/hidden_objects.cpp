@@ -29,7 +29,7 @@ const Vector kBehindCamera(0, 0, -1000);     // metres
 /// world_from_carrier.
 Rigid<double> carrier_pose(const Clip& clip, const Carrier& carrier, const SceneState& state) {
   if (!carrier.joint) return {};
-  const PosedJoints body = pose_skeleton(clip.avatar, state.body);
+  const PosedJoints body = pose_skeleton(clip.person(carrier.person).avatar, state.person(carrier.person));
   const double* const row = body.transforms.data() + 12 * *carrier.joint;
   Rigid<double> pose;
   for (Index r = 0; r < 3; ++r) {
@@ -58,21 +58,21 @@ double spread_with(const Clip& clip, const Carrier& carrier, std::size_t object,
 }
 
 /// The wrist that a joint of a hand belongs to; none: it is no hand's.
-std::optional<Index> wrist_of(const Clip& clip, Index joint) {
+std::optional<Index> wrist_of(const Avatar& avatar, Index joint) {
   while (joint >= 0) {
     if (std::find(kWrists.begin(), kWrists.end(), joint) != kWrists.end()) return joint;
-    joint = clip.avatar.parents[static_cast<std::size_t>(joint)];
+    joint = avatar.parents[static_cast<std::size_t>(joint)];
   }
   return {};
 }
 
-bool is_touched(const Clip& clip, std::size_t object, Index wrist, const SceneState& state) {
+bool is_touched(const Clip& clip, std::size_t object, std::size_t person, const SceneState& state) {
+  const Avatar& avatar = clip.person(person).avatar;
   const ObjectCentres centres({&clip.objects[object].gaussians});
   const std::array<Rigid<double>, 1> pose = {rigid_of(state.objects[object])};
-  const std::vector<double> joints = pose_joints(clip.avatar, state.body);
+  const std::vector<double> joints = pose_joints(avatar, state.person(person));
   for (Index j = 0; 3 * j < std::ssize(joints); ++j) {
-    if (wrist_of(clip, j) == wrist && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance))
-      return true;
+    if (wrist_of(avatar, j) && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance)) return true;
   }
   return false;
 }
@@ -110,7 +110,8 @@ double shown_share(const Clip& clip, double pixels, std::size_t object, const Sc
 }  // namespace
 
 std::string carrier_text(const Carrier& carrier) {
-  return carrier.joint ? "stays with the chest" : "stays where it was";
+  if (!carrier.joint) return "stays where it was";
+  return "stays with the chest" + (carrier.person == 0 ? "" : " of person " + std::to_string(carrier.person + 1));
 }
 
 std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double mask_threshold,
@@ -129,12 +130,17 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
 
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen) {
   const std::span<const SceneState* const> last = std::span(seen).last(std::min(kFramesOfCarrier, seen.size()));
-  const bool is_held = std::any_of(kWrists.begin(), kWrists.end(),
-                                   [&](Index wrist) { return is_touched(clip, object, wrist, *last.back()); });
-  const Carrier person{kChest};
-  if (is_held && spread_with(clip, person, object, last) < spread_with(clip, {}, object, last) + kHandShift)
-    return person;
-  return {};
+  Carrier best;
+  double least = spread_with(clip, best, object, last) + kHandShift;
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    if (!is_touched(clip, object, p, *last.back())) continue;
+    const Carrier person{kChest, p};
+    const double spread = spread_with(clip, person, object, last);
+    if (!(spread < least)) continue;
+    best = person;
+    least = spread;
+  }
+  return best;
 }
 
 ObjectPose carried_pose(const Clip& clip, const Carrier& carrier, std::size_t object, const SceneState& from,

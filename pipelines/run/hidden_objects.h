@@ -28,6 +28,7 @@ inline constexpr double kDoubtfulIou = 0.5, kLostIou = 0.2;
 /// What an object goes with while nobody sees it: a joint of the body, or the world.
 struct Carrier {
   std::optional<Index> joint;  ///< the chest; none: the world
+  std::size_t person = 0;      ///< whose
 
   bool operator==(const Carrier&) const = default;
 };
@@ -50,9 +51,9 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
 bool is_shown_at(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
                  const SceneState& state, const ColorState& colors);
 
-/// The chest, if the object touched a hand in the last frame that shows it, and in the last frames that do moved with
-/// the chest at least as well as it stood in the world; else the world. Hands themselves are often hidden with what
-/// they hold, and then hardly known.
+/// The chest of a person whose hand the object touched in the last frame that shows it, if in the last frames that do
+/// it moved with the chest at least as well as it stood in the world; of several the one that it moved with best; else
+/// the world. Hands themselves are often hidden with what they hold, and then hardly known.
 /// @param seen  the frames that show the object, one at least: their states, in order
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen);
 

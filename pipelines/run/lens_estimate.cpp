@@ -19,7 +19,7 @@ constexpr double kBendFineness = 1e4;  // steps of what is told in a unit of k1
 
 LensEstimate estimated_lens(const RunConfig& config, const Clip& clip) {
   ColorState colors;
-  colors.net = first_net(config, clip);
+  colors.nets = first_nets(config, clip);
   const Image drawn = render_state(config, clip, clip.first, colors);
   const auto psnr_with = [&](double k1) {
     Clip bent;  // of the video alone: Gaussians are not copied

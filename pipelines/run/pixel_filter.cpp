@@ -35,7 +35,7 @@ class Comparison {
  public:
   Comparison(const RunConfig& config, const Clip& clip)
       : config_(config), clip_(clip), frame_(read_frame(clip, 0)), pixels_(looked_at(config, frame_)) {
-    colors_.net = first_net(config, clip);
+    colors_.nets = first_nets(config, clip);
   }
 
   /// @param width  standard deviation, pixels

@@ -71,7 +71,7 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
   RunProgress progress;
   const StageOrder order = order_of_stages(config);
   try {
-    progress = load_progress(file, identity, clip, order.frames, first_net(config, clip), order.first, order.later);
+    progress = load_progress(file, identity, clip, order.frames, first_nets(config, clip), order.first, order.later);
   } catch (const DataError& damage) {
     throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
   }
@@ -119,7 +119,7 @@ class Reconstruction {
         order_(order_of_stages(config)),
         first_stages_(order_.first),
         frame_stages_(order_.frames),
-        progress_(first_progress(clip_, frame_stages_, first_net(config, clip))),
+        progress_(first_progress(clip_, frame_stages_, first_nets(config, clip))),
         sigmas_(no_sigmas(clip.objects.size())),
         surest_stage_(config.uncertainty ? stage_of_sigmas(config) : std::nullopt),
         start_colors_(progress_.colors),
@@ -469,8 +469,7 @@ class Reconstruction {
                  std::chrono::steady_clock::time_point begin) {
     write_image(folder_.paths().frame_image(static_cast<int>(index), "target"), frame.target);
     write_result(index, frame, after.back(), progress_.colors, progress_.image_errors);
-    if (progress_.colors.net && hsi4d::moves_colors(config_))
-      write_color_net(net_file(index, 1), *progress_.colors.net);
+    if (hsi4d::moves_colors(config_)) write_color_nets(index, 1);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     if (config_.uncertainty) progress_.sigmas.push_back(sigmas_);
     progress_.seconds += seconds_since(begin);
@@ -558,7 +557,7 @@ class Reconstruction {
     std::vector<SceneState> biased = states_before(l);
     for (std::size_t t = 1; t < biased.size(); ++t) give_bias(biased[t]);
     SceneState state = biased[static_cast<std::size_t>(index)];
-    progress_.colors.net = colors_after(index).net;
+    progress_.colors.nets = colors_after(index).nets;
     if (follows_hidden()) look_for_lost_objects(index, frame, biased, done.back(), state);
     for (std::size_t i = l; i < end; ++i) {
       run_in_frame(later_stage() + i, {index, frame, progress_.covered, done}, state, progress_.colors,
@@ -567,7 +566,7 @@ class Reconstruction {
       progress_.later[i].states.push_back(state);
     }
     if (progress_.bias) hsi4d::remove_depth_bias(clip_, *progress_.bias, progress_.later[end - 1].states.back());
-    if (moves_colors(l, end)) write_color_net(net_file(index, pass_), *progress_.colors.net);
+    if (moves_colors(l, end)) write_color_nets(index, pass_);
     const std::size_t surest = surest_stage_.value_or(0);
     if (later_stage() + l <= surest && surest < later_stage() + end)
       progress_.sigmas[static_cast<std::size_t>(index)] = sigmas_;
@@ -581,7 +580,9 @@ class Reconstruction {
     if (!progress_.bias) return;
     DepthBias inverse = *progress_.bias;
     inverse.human = 1 / inverse.human;
-    for (double& factor : inverse.objects) factor = 1 / factor;
+    for (auto* factors : {&inverse.objects, &inverse.others}) {
+      for (double& factor : *factors) factor = 1 / factor;
+    }
     hsi4d::remove_depth_bias(clip_, inverse, state);
   }
 
@@ -592,7 +593,7 @@ class Reconstruction {
 
   /// Whether one of some later stages moves the color net or what it reads.
   bool moves_colors(std::size_t l, std::size_t end) const {
-    if (!progress_.colors.net) return false;
+    if (progress_.colors.nets.empty()) return false;
     for (std::size_t s = later_stage() + l; s < later_stage() + end; ++s) {
       const auto& moved = config_.stages[s].second.optimize;
       if (find_entry(moved, "color_net") != nullptr || find_entry(moved, kFeaturesGroup) != nullptr) return true;
@@ -618,22 +619,31 @@ class Reconstruction {
     return {result.iterations, result.rollbacks, result.seconds};
   }
 
-  /// The color net as the last whole pass left it in a frame, in the precision of its file, so that a resumed run has
-  /// the same.
+  /// The color nets as the last whole pass left them in a frame, in the precision of its file, so that a resumed run
+  /// has the same.
   ColorState colors_after(Index frame) const {
     ColorState colors = start_colors_;
-    if (frame >= first_worked_on() && colors.net && hsi4d::moves_colors(config_))
-      colors.net = read_color_net(net_file(frame, frame == 0 ? 1 : colors_pass_), clip_.avatar.count(),
-                                  clip_.avatar.joint_count());
+    if (frame < first_worked_on() || !hsi4d::moves_colors(config_)) return colors;
+    for (std::size_t p = 0; p < colors.nets.size(); ++p) {
+      const Avatar& avatar = clip_.person(p).avatar;
+      colors.nets[p] =
+          read_color_net(net_file(frame, frame == 0 ? 1 : colors_pass_, p), avatar.count(), avatar.joint_count());
+    }
     return colors;
   }
 
-  /// Where a pass keeps the color net of a frame.
-  std::string net_file(Index frame, int pass) const {
+  void write_color_nets(Index frame, int pass) const {
+    for (std::size_t p = 0; p < progress_.colors.nets.size(); ++p)
+      write_color_net(net_file(frame, pass, p), progress_.colors.nets[p]);
+  }
+
+  /// Where a pass keeps the color net of a person in a frame.
+  std::string net_file(Index frame, int pass, std::size_t person) const {
     const std::filesystem::path file = folder_.paths().frame_color_net(static_cast<int>(frame));
-    if (pass == 1) return file.string();
-    return (file.parent_path() / (file.stem().string() + "_pass" + std::to_string(pass) + file.extension().string()))
-        .string();
+    std::string name = file.stem().string();
+    if (pass > 1) name += "_pass" + std::to_string(pass);
+    if (person > 0) name += "_of_" + clip_.person(person).name;
+    return (file.parent_path() / (name + file.extension().string())).string();
   }
 
   const std::vector<SceneState>& result() const { return result_of(progress_); }
@@ -753,13 +763,15 @@ class Reconstruction {
     }
   }
 
-  /// 1 where neither masks nor the drawn human are.
+  /// 1 where neither masks nor drawn people are.
   static Image background_beside(const StatePicture& picture, const ClipFrame& frame) {
     constexpr float kHardlyHuman = 0.02F;
     Image background = background_of(frame);
     for (int y = 0; y < background.height(); ++y) {
       for (int x = 0; x < background.width(); ++x) {
-        if (picture.silhouette(0, y, x) > kHardlyHuman) background(0, y, x) = 0;
+        const auto is_at = [x, y](const Image& silhouette) { return silhouette(0, y, x) > kHardlyHuman; };
+        if (is_at(picture.silhouette) || std::any_of(picture.others.begin(), picture.others.end(), is_at))
+          background(0, y, x) = 0;
       }
     }
     return background;
@@ -770,8 +782,14 @@ class Reconstruction {
     MetricValues errors = image_errors(picture.image, frame.target, &foreground);
     const MetricValues background = background_errors(picture.image, frame.target, background_beside(picture, frame));
     errors.insert(errors.end(), background.begin(), background.end());
-    const std::optional<double> iou = mask_iou(picture.silhouette, frame.human_mask);
-    if (iou) errors.emplace_back("silhouette_iou", *iou);
+    std::vector<FrameMetrics> ious;  // of the people that masks show
+    for (std::size_t p = 0; p <= picture.others.size(); ++p) {
+      const std::optional<double> iou =
+          mask_iou(p == 0 ? picture.silhouette : picture.others[p - 1], frame.person_mask(p));
+      if (iou) ious.push_back({0, {{"silhouette_iou", *iou}}});
+    }
+    const MetricValues mean = mean_errors(ious);
+    errors.insert(errors.end(), mean.begin(), mean.end());
     return errors;
   }
 

@@ -23,7 +23,7 @@ FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const Colo
           config.camera.increment,
           draw,
           Vector3<double>(config.background.data()),
-          colors.net ? &*colors.net : nullptr,
+          colors.nets,
           config.color_net.camera_gradient};
 }
 
@@ -86,9 +86,12 @@ std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& st
     rows.objects.push_back(needs_objects ? all_rows(object.count())
                                          : seen_rows(posed_object(object, state.objects[o]), view_range));
   }
-  const Avatar& avatar = clip.avatar;
-  rows.human = needs_human ? all_rows(avatar.count())
-                           : seen_rows({rest_gaussians(avatar), blended_transforms(avatar, state.body)}, view_range);
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    const Avatar& avatar = clip.person(p).avatar;
+    rows.people.push_back(
+        needs_human ? all_rows(avatar.count())
+                    : seen_rows({rest_gaussians(avatar), blended_transforms(avatar, state.person(p))}, view_range));
+  }
   return rows;
 }
 
@@ -115,7 +118,14 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   targets.weight = weight.empty() ? nullptr : &weight;
   targets.human_mask = &frame.human_mask;
   targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
-  if (clip.keypoints) targets.keypoints = &clip.keypoints->frames.at(static_cast<std::size_t>(frame_task.index));
+  const auto t = static_cast<std::size_t>(frame_task.index);
+  if (clip.keypoints) targets.keypoints = &clip.keypoints->frames.at(t);
+  for (std::size_t p = 0; p < clip.others.size(); ++p) {
+    const Image& mask = frame.other_masks[p];
+    const std::optional<Keypoints>& keypoints = clip.others[p].keypoints;
+    targets.others.push_back({&mask, mask_center(mask, task.config.data.mask_threshold)[2] != 0,
+                              keypoints ? &keypoints->frames.at(t) : nullptr});
+  }
   targets.depth_map = &frame.depth_map;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     if (are_objects_read) {
@@ -206,7 +216,7 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
                     .held = graph->held()});
   graph->read_state(stage.optimize, state);
   if (task.found != nullptr) *task.found = graph->unknowns();
-  if (colors.net) graph->read_color_net(stage.optimize, *colors.net);
+  graph->read_color_nets(stage.optimize, colors.nets);
   if (task.sigmas != nullptr)
     *task.sigmas = place_sigmas<S>(tape, task, graph->groups(), inputs, graph->object_places(),
                                    foreground_of(frame.frame), state.camera_from_world.rotation);
@@ -273,10 +283,14 @@ StatePicture picture_in(const RunConfig& config, const Clip& clip, const SceneSt
   FrameGraph<S> graph(tape, clip, state.camera_from_world, settings);
   graph.set_state(state);
   tape.forward(graph.rendered().image);
-  StatePicture picture{to_image(tape.value(graph.rendered().image)), {}, {}};
+  StatePicture picture{to_image(tape.value(graph.rendered().image)), {}, {}, {}};
   if (!has_silhouette) return picture;
   tape.forward(graph.loss_inputs().human_opacity);
   picture.silhouette = to_image(tape.value(graph.loss_inputs().human_opacity));
+  for (const LossInputs<S>& other : graph.loss_inputs().others) {
+    tape.forward(other.human_opacity);
+    picture.others.push_back(to_image(tape.value(other.human_opacity)));
+  }
   if (!settings.object_opacity || clip.objects.empty()) return picture;
   tape.forward(graph.loss_inputs().object_opacity);
   picture.objects = planes_of(to_image(tape.value(graph.loss_inputs().object_opacity)));
@@ -326,8 +340,15 @@ template RecordedFrame<double> record_frame(Tape<double>&, const StageTask&, con
 template SequenceGraph<float> record_sequence(Tape<float>&, const StageTask&, const std::vector<SceneState>&);
 template SequenceGraph<double> record_sequence(Tape<double>&, const StageTask&, const std::vector<SceneState>&);
 
-std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
-  return first_color_net(config.color_net, clip.avatar, config.seed);
+std::vector<ColorNet> first_nets(const RunConfig& config, const Clip& clip) {
+  std::vector<ColorNet> nets;
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    std::optional<ColorNet> net =
+        first_color_net(config.color_net, clip.person(p).avatar, config.seed + static_cast<std::int64_t>(p));
+    if (!net) return {};
+    nets.push_back(std::move(*net));
+  }
+  return nets;
 }
 
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {

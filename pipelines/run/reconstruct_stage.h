@@ -68,14 +68,15 @@ StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, 
 StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
                                     const StageGradcheckOptions& options = {});
 
-/// The color net that a run begins with, if it has one.
-std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip);
+/// The color nets that a run begins with, by person; none where one of the people has none.
+std::vector<ColorNet> first_nets(const RunConfig& config, const Clip& clip);
 
 /// A state as its own camera sees it.
 struct StatePicture {
   Image image;                 ///< [3,H,W]
   Image silhouette;            ///< [1,H,W] the human's opacity
   std::vector<Image> objects;  ///< [1,H,W] that of each object, where the best start is asked of them
+  std::vector<Image> others;   ///< [1,H,W] that of each person beside the first one
 };
 StatePicture picture_of_state(const RunConfig& config, const Clip& clip, const SceneState& state,
                               const ColorState& colors);

@@ -152,14 +152,20 @@ std::string loss_with(const RunConfig& config, LossInput input) {
   return "";
 }
 
-/// Reads the body whose vertices a loss asks for. One that the avatar was not made on is left out, which is told.
-void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
-  BodyModel body = rest_body(body_of_avatar(config.body, config.data.avatar.string()));
-  const std::string difference = difference_from(body, clip.avatar);
-  if (difference.empty()) {
-    clip.body = std::move(body);
-  } else {
-    log_warning(loss + ": the avatar's Gaussians stand for the vertices of `body`: " + difference);
+std::string avatar_file(const DataSettings& data, std::size_t person) {
+  return (person == 0 ? data.avatar : data.people.at(person - 1).second.avatar).string();
+}
+
+/// Reads the bodies whose vertices a loss asks for. One that the avatar was not made on is left out, which is told.
+void give_bodies(const RunConfig& config, const std::string& loss, Clip& clip) {
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    BodyModel body = rest_body(body_of_avatar(config.body, avatar_file(config.data, p)));
+    const std::string difference = difference_from(body, clip.person(p).avatar);
+    if (difference.empty()) {
+      clip.person(p).body = std::move(body);
+    } else {
+      log_warning(loss + ": the avatar's Gaussians stand for the vertices of `body`: " + difference);
+    }
   }
 }
 
@@ -186,31 +192,35 @@ void give_directions(const RunConfig& config, const std::string& group, Clip& cl
 
 /// A motion of SMPL-X tells other programs of whom it is; that of the program's own body has betas that mean nothing to
 /// them.
-void give_shape(const RunConfig& config, Clip& clip) {
-  const std::optional<AvatarShape> shape = read_avatar_shape(config.data.avatar.string());
-  if (!shape || shape->body != kSmplxName || !clip.betas.empty()) return;
-  clip.betas = shape->betas;
-  clip.gender = shape->gender;
+void give_shapes(const RunConfig& config, Clip& clip) {
+  for (std::size_t p = 0; p < clip.people(); ++p) {
+    ClipPerson& person = clip.person(p);
+    const std::optional<AvatarShape> shape = read_avatar_shape(avatar_file(config.data, p));
+    if (!shape || shape->body != kSmplxName || !person.betas.empty()) continue;
+    person.betas = shape->betas;
+    person.gender = shape->gender;
+  }
 }
 
 }  // namespace
 
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
-  body_of_avatar(config.body, config.data.avatar.string());  // what they contradict each other in shows now
+  for (std::size_t p = 0; p < clip.people(); ++p)
+    body_of_avatar(config.body, avatar_file(config.data, p));  // what they contradict each other in shows now
   warn_of_antialiasing(clip.antialiased, config.render.antialias);
   set_image_size(clip, config);
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
   const std::string loss = loss_with(config, LossInput::kBodyVertices);
-  if (!loss.empty()) give_body(config, loss, clip);
+  if (!loss.empty()) give_bodies(config, loss, clip);
   if (clip.contacts && !loss_with(config, LossInput::kContacts).empty())
     check_contacts(*clip.contacts, clip.body ? &*clip.body : nullptr, clip.avatar.weights,
                    config.data.contacts.string());
   const std::string betas = betas_group(config);
   if (!betas.empty()) give_directions(config, betas, clip);
-  give_shape(config, clip);
+  give_shapes(config, clip);
   return clip;
 }
 

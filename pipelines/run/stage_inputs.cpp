@@ -82,8 +82,6 @@ StageInputs::StageInputs(const RunConfig& asked, const std::vector<LossTerm>& te
   if (*frame > 0) start = frame_start(config.start, clip, before);
 }
 
-ColorState StageInputs::colors() const {
-  return first_color_state(first_color_net(config.color_net, clip.avatar, config.seed));
-}
+ColorState StageInputs::colors() const { return first_color_state(first_nets(config, clip)); }
 
 }  // namespace hsi4d

@@ -144,11 +144,13 @@ void warn_of_still_joints(const Clip& clip, const std::vector<SceneState>& befor
                           const std::string& stage) {
   double sum = 0;
   Index count = 0;
-  for (std::size_t t = 1; t < after.size(); ++t) {
-    const std::vector<double> from = pose_joints(clip.avatar, before[t].body),
-                              to = pose_joints(clip.avatar, after[t].body);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(3 * kMetricJoints); i += 3)
-      sum += (Vector3<double>(to.data() + i) - Vector3<double>(from.data() + i)).norm();
+  for (std::size_t i = 0; i < after.size() * clip.people(); ++i) {
+    const std::size_t t = i % after.size(), p = i / after.size();
+    if (t == 0) continue;  // is given
+    const std::vector<double> from = pose_joints(clip.person(p).avatar, before[t].person(p)),
+                              to = pose_joints(clip.person(p).avatar, after[t].person(p));
+    for (std::size_t j = 0; j < static_cast<std::size_t>(3 * kMetricJoints); j += 3)
+      sum += (Vector3<double>(to.data() + j) - Vector3<double>(from.data() + j)).norm();
     count += kMetricJoints;
   }
   if (count == 0) return;

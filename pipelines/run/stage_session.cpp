@@ -19,7 +19,9 @@ void check_fits(const SceneState& state, const Clip& clip, const std::string& na
                       std::to_string(wanted));
   };
   check(std::ssize(state.objects), std::ssize(clip.objects), "objects");
-  check(state.body.joints(), clip.first.body.joints(), "joints");
+  check(std::ssize(state.others), std::ssize(clip.others), "people beside the first one");
+  for (std::size_t p = 0; p < clip.people(); ++p)
+    check(state.person(p).joints(), clip.first.person(p).joints(), "joints");
 }
 
 template <class S>

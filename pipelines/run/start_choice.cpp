@@ -56,7 +56,8 @@ ChosenStart choose_start(const RunConfig& config, const Clip& clip, const std::v
         settings.root = root;
         settings.pose = pose;
         ChosenStart candidate = best;
-        candidate.state.body = frame_start(settings, clip, done).body;
+        const SceneState start = frame_start(settings, clip, done);
+        for (std::size_t p = 0; p < clip.people(); ++p) candidate.state.person(p) = start.person(p);
         if (config.start.pose == StartFrom::kBest) candidate.from[kPose] = pose;
         if (config.start.root == StartFrom::kBest) candidate.from[kRoot] = root;
         consider(candidate);

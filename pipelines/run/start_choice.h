@@ -31,8 +31,8 @@ struct ChosenStart {
 
 /// The start of a frame: each part for which the settings ask for the best begins where the frame before ended, going
 /// on as before, or as estimated, whichever gives the image that is nearest to the frame's (mean absolute difference;
-/// of equals the first). Root and joints are chosen together, then the objects. What does not ask for it stays as in
-/// `state`.
+/// of equals the first). Root and joints are chosen together, and for all people at once, then the objects. What does
+/// not ask for it stays as in `state`.
 /// @param done   the states of the frames before, frame 0 included
 /// @param state  where frame_start begins, with the camera that the images are drawn from
 ChosenStart choose_start(const RunConfig& config, const Clip& clip, const std::vector<SceneState>& done,

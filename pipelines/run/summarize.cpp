@@ -177,25 +177,62 @@ class ObjectPenetration {
   bool is_known_ = false;
 };
 
+/// Contact of the hands, height and sliding of the feet and distances from keypoints, which need no truth.
+/// @param states  by frame, of a person alone
+std::vector<MetricValues> body_values(const Clip& clip, const std::vector<const Gaussians*>& objects,
+                                      const std::vector<SceneState>& states, std::size_t person = 0) {
+  const Avatar& avatar = clip.person(person).avatar;
+  std::vector<MetricValues> all = contact_by_frame(avatar, objects, states);
+  std::vector<std::vector<double>> joints;
+  for (const SceneState& state : states) joints.push_back(pose_joints(avatar, state.body));
+  const std::vector<MetricValues> sliding = sliding_by_frame(joints, clip.frame_rate);
+  const std::vector<MetricValues> drift = floor_drift_by_frame(joints);
+  const std::vector<MetricValues> seen = keypoint_errors_by_frame(clip, states, person);
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    append_values(drift[t], all[t]);
+    append_values(sliding[t], all[t]);
+    append_values(seen[t], all[t]);
+  }
+  return all;
+}
+
+/// Where a person is, and the camera where that is known exactly.
+std::vector<FrameState> bodies_at(const Clip& clip, std::size_t person, const std::vector<SceneState>& states,
+                                  bool is_truth) {
+  std::vector<FrameState> frames;
+  for (const SceneState& state : with_person(states, person)) {
+    frames.emplace_back().joints = pose_joints(clip.person(person).avatar, state.body);
+    if (is_truth) frames.back().camera_from_world = state.camera_from_world;
+  }
+  return frames;
+}
+
+/// The people beside the first one.
+void add_people(const Clip& clip, const std::vector<SceneState>& result, RunSummary& summary) {
+  const std::vector<const Gaussians*> objects = objects_of(clip);
+  for (std::size_t p = 1; p < clip.people(); ++p) {
+    PersonSummary& person = summary.people.emplace_back(PersonSummary{clip.person(p).name, {}, {}});
+    std::vector<FrameState> truth;
+    if (clip.truth) truth = bodies_at(clip, p, *clip.truth, true);
+    const auto values_of = [&](const std::vector<SceneState>& states) {
+      const std::vector<FrameState> bodies = bodies_at(clip, p, states, false);
+      MetricValues values =
+          clip.truth ? sequence_summary(bodies, truth, clip.frame_rate) : motion_jitter(bodies, clip.frame_rate);
+      append_values(mean_after_first(body_values(clip, objects, with_person(states, p), p)), values);
+      return values;
+    };
+    person.start = values_of(start_of(clip));
+    person.result = values_of(result);
+    if (clip.truth) person.per_frame = sequence_errors(bodies_at(clip, p, result, false), truth, clip.frame_rate);
+  }
+}
+
 /// Contact of the hands, what is inside of objects, height and sliding of the feet and distances from keypoints, which
 /// need no truth: of the baselines, of what every stage that moves the body left, and of the result's frames.
 void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress, RunSummary& summary) {
   const std::vector<const Gaussians*> objects = objects_of(clip);
   const ObjectPenetration inside(clip);
-  const auto by_frame = [&](const std::vector<SceneState>& states) {
-    std::vector<MetricValues> all = contact_by_frame(clip.avatar, objects, states);
-    std::vector<std::vector<double>> joints;
-    for (const SceneState& state : states) joints.push_back(pose_joints(clip.avatar, state.body));
-    const std::vector<MetricValues> sliding = sliding_by_frame(joints, clip.frame_rate);
-    const std::vector<MetricValues> drift = floor_drift_by_frame(joints);
-    const std::vector<MetricValues> seen = keypoint_errors_by_frame(clip, states);
-    for (std::size_t t = 0; t < all.size(); ++t) {
-      append_values(drift[t], all[t]);
-      append_values(sliding[t], all[t]);
-      append_values(seen[t], all[t]);
-    }
-    return all;
-  };
+  const auto by_frame = [&](const std::vector<SceneState>& states) { return body_values(clip, objects, states); };
   const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
                            std::vector<FrameMetrics>& per_frame) {
     const std::vector<MetricValues> values = by_frame(states);
@@ -313,6 +350,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   if (clip.surface) add_penetration(config, clip, progress, summary);
   add_sigmas(clip, result_of(progress), progress.sigmas, summary);
   add_seen_objects(progress, summary);
+  add_people(clip, result_of(progress), summary);
   summary.quality = quality_of(summary.metrics.back().values, clip.frame_rate);
   return summary;
 }

@@ -76,18 +76,34 @@ ConfigValue hinge_of(const SyntheticObject& object, const Rigid<double>& first) 
   return joint;
 }
 
+/// Where the files of a person beside the first one are in the dataset.
+fs::path folder_of_person(const std::string& name) { return fs::path("people") / name; }
+
+ConfigValue people_data(const ConfigMap<SyntheticPerson>& people) {
+  ConfigValue all = ConfigValue::make_object();
+  for (const auto& [name, person] : people) {
+    ConfigValue data = ConfigValue::make_object();
+    add_file(data, "avatar", folder_of_person(name) / "avatar.safetensors");
+    add_file(data, "initial", folder_of_person(name) / "initial.json");
+    all.add(name, std::move(data));
+  }
+  return all;
+}
+
 /// Files that all clips share.
 /// @param first  where the object is in frame 0
-ConfigValue shared_data(const SyntheticObject& object, const std::optional<Rigid<double>>& first, bool has_surface) {
+ConfigValue shared_data(const SyntheticObject& object, const std::optional<Rigid<double>>& first,
+                        const SyntheticSettings& settings, bool has_surface) {
   ConfigValue data = ConfigValue::make_object();
   add_file(data, "scene", "scene.ply");
   if (object.exists()) {
     const ConfigValue file = ConfigValue::make_string("objects/" + object.name + ".ply");
-    ConfigValue settings = object_config_of("gaussians", file);
-    if (object.hinge && first) settings.add("joint", hinge_of(object, *first));
-    data.add("objects", object_config_of(object.name, std::move(settings)));
+    ConfigValue of_object = object_config_of("gaussians", file);
+    if (object.hinge && first) of_object.add("joint", hinge_of(object, *first));
+    data.add("objects", object_config_of(object.name, std::move(of_object)));
   }
   add_file(data, "avatar", "avatar.safetensors");
+  if (!settings.people.empty()) data.add("people", people_data(settings.people));
   if (has_surface) add_file(data, "surface", kSurfaceFile);
   return data;
 }
@@ -111,7 +127,7 @@ fs::path folder_of(Index clip, Index clips) { return clips == 1 ? fs::path() : f
 ConfigValue data_sections(const SyntheticObject& object, const std::optional<Rigid<double>>& first,
                           const SyntheticSettings& settings, bool has_surface) {
   const bool is_chain = settings.clips > 1;  // whose objects move freely
-  ConfigValue shared = shared_data(object, is_chain ? std::nullopt : first, has_surface);
+  ConfigValue shared = shared_data(object, is_chain ? std::nullopt : first, settings, has_surface);
   if (settings.clips == 1) return object_config_of("data", merged(std::move(shared), clip_data({}, settings.video)));
   ConfigValue sections = object_config_of("data", std::move(shared)), chain = ConfigValue::make_array();
   for (Index k = 0; k < settings.clips; ++k) {
@@ -142,39 +158,64 @@ void check_ffmpeg(const SyntheticSettings& settings) {
       "synthetic.video=png");
 }
 
+/// The settings by which a person beside the first one is made.
+SyntheticSettings settings_of(const SyntheticPerson& person, const SyntheticSettings& settings) {
+  SyntheticSettings own = settings;
+  own.seed += person.seed;
+  own.variation = 1;  // in clothes of its own
+  return own;
+}
+
+Avatar made_avatar(const BodyModel& body, const SyntheticSettings& settings) {
+  AvatarSettings avatar_settings;
+  avatar_settings.gaussians = settings.avatar_gaussians;
+  avatar_settings.seed = static_cast<std::uint64_t>(settings.seed);
+  return in_other_clothes(surface_avatar(body, avatar_settings), settings);
+}
+
 /// The frames of the video one after the other, with what is done to them that the reconstruction does not know of.
 class Film {
  public:
-  Film(const SyntheticSettings& settings, const RenderSettings& render, const BodyModel& body, const Avatar& tracked,
-       const Gaussians& scene, const SyntheticObject& object)
+  Film(const SyntheticSettings& settings, const RenderSettings& render, const BodyModel& body,
+       const std::vector<Avatar>& tracked, const Gaussians& scene, const SyntheticObject& object)
       : settings_(settings),
         render_(render),
         body_(body),
         scene_(scene),
         object_(object),
-        avatar_(filmed_avatar(body, tracked, settings)),
         occluders_(object_occluders(object.gaussians)),
-        revealed_(settings.faults.revealed, static_cast<std::uint64_t>(settings.seed)) {}
+        revealed_(settings.faults.revealed, static_cast<std::uint64_t>(settings.seed)) {
+    for (std::size_t p = 0; p < tracked.size(); ++p)
+      avatars_.push_back(
+          filmed_avatar(body, tracked[p], p == 0 ? settings : settings_of(settings.people[p - 1].second, settings)));
+  }
 
   /// Frames are asked for in order.
   SyntheticFrame frame(const SyntheticClip& clip, std::size_t t) {
-    const BodyPose& pose = clip.motion.poses[t];
     const Rigid<double> place = object_.exists() ? clip.object[t] : Rigid<double>();
     const Camera& camera = clip.cameras[t];
     const double part = clip.cameras.size() > 1 ? double(t) / double(clip.cameras.size() - 1) : 0;
-    Avatar avatar = with_faded_hands(avatar_, settings_.faults.hands_fade * hands_gone(part));
-    if (settings_.faults.appearance > 0) avatar = with_changed_colors(avatar, part * settings_.faults.appearance);
-    avatar = shaded_avatar(avatar, pose, settings_.light.shading);
+    const auto pose_of = [&](std::size_t p) -> const BodyPose& {
+      return (p == 0 ? clip.motion : clip.others.at(p - 1)).poses[t];
+    };
+    std::vector<Avatar> avatars;
     std::vector<Occluder> occluders;
-    if (settings_.light.shadow > 0) {
-      occluders = body_occluders(body_, pose);
-      const std::vector<Occluder> of_object = moved(occluders_, place);
-      occluders.insert(occluders.end(), of_object.begin(), of_object.end());
+    const auto add_occluders = [&occluders](const std::vector<Occluder>& more) {
+      occluders.insert(occluders.end(), more.begin(), more.end());
+    };
+    for (std::size_t p = 0; p < avatars_.size(); ++p) {
+      Avatar avatar = with_faded_hands(avatars_[p], settings_.faults.hands_fade * hands_gone(part));
+      if (settings_.faults.appearance > 0) avatar = with_changed_colors(avatar, part * settings_.faults.appearance);
+      avatars.push_back(shaded_avatar(avatar, pose_of(p), settings_.light.shading));
+      if (settings_.light.shadow > 0) add_occluders(body_occluders(body_, pose_of(p)));
+      if (settings_.light.shadow > 0 && p == 0) add_occluders(moved(occluders_, place));
     }
+    std::vector<DrawnPerson> others;
+    for (std::size_t p = 1; p < avatars.size(); ++p) others.push_back({avatars[p], pose_of(p)});
     const Gaussians scene = shadowed_scene(scene_, occluders, camera_center_world(camera), settings_.light.shadow);
     const Gaussians object = shaded_object(object_, place, settings_.light.shading);
-    const SyntheticRenderer renderer(scene, object, avatar, render_);
-    SyntheticFrame frame = renderer.frame(pose, place, camera, settings_.supersample);
+    const SyntheticRenderer renderer(scene, object, avatars.front(), render_);
+    SyntheticFrame frame = renderer.frame(pose_of(0), place, camera, settings_.supersample, others);
     revealed_.apply(frame);
     return frame;
   }
@@ -185,7 +226,7 @@ class Film {
   const BodyModel& body_;
   const Gaussians& scene_;
   const SyntheticObject& object_;
-  Avatar avatar_;
+  std::vector<Avatar> avatars_;  // by person
   std::vector<Occluder> occluders_;
   RevealedContent revealed_;
 };
@@ -236,6 +277,14 @@ void write_states(const ClipFiles& files, const SyntheticClip& clip, const Synth
   write_text_file(files.file("initial.json"), initial_json(object, clip.object, has_tracks));
   write_motion(files.file("truth/motion.npz"), clip.motion);
   write_cameras(files.file("truth/cameras.json"), clip.cameras);
+  for (std::size_t p = 0; p < clip.others.size(); ++p) {
+    const auto& [name, person] = settings.people[p];
+    const fs::path folder = folder_of_person(name);
+    const Motion& motion = clip.others[p];
+    write_motion(files.file(folder / "initial_motion.npz"), disturbed_motion(motion, settings_of(person, settings)));
+    write_text_file(files.file(folder / "initial.json"), initial_json({}, {}, false));
+    write_motion(files.file(fs::path("truth") / motion_file_of(name)), motion);
+  }
   if (!object.exists()) return;
   write_objects(files.file("truth/objects.npz"), object.name, clip.object);
   if (has_tracks) write_objects(files.file(kObjectTracks), object.name, disturbed_object(clip.object, settings));
@@ -257,6 +306,8 @@ void write_frames(const ClipFiles& files, const SyntheticClip& clip, const Synth
     frames.add(name, frame.color);
     write_mask(kHumanMasks, frame.human_mask);
     if (object.exists()) write_mask(object.name, frame.object_mask);
+    for (std::size_t p = 0; p < frame.other_masks.size(); ++p)
+      write_mask(settings.people[p].first, frame.other_masks[p]);
     after_frame();
   }
   frames.commit();
@@ -274,19 +325,21 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
                    const Observer& observer, const ConfigValue& more_sections, const BodySettings& body_settings) {
   check_ffmpeg(settings);
   FolderInMaking out(folder);
-  const std::uint64_t seed = static_cast<std::uint64_t>(settings.seed);
   const BodyModel body = rest_body(body_settings);
-  AvatarSettings avatar_settings;
-  avatar_settings.gaussians = settings.avatar_gaussians;
-  avatar_settings.seed = seed;
-  const Avatar avatar = in_other_clothes(surface_avatar(body, avatar_settings), settings);
+  std::vector<Avatar> avatars = {made_avatar(body, settings)};
   const SyntheticObject object = synthetic_object(settings);
   const ClipSettings whole_settings = clip_settings(settings);
-  const SyntheticClip whole = synthetic_clip(body, object, whole_settings);
+  SyntheticClip whole = synthetic_clip(body, object, whole_settings);
+  for (const auto& [name, person] : settings.people) {
+    avatars.push_back(made_avatar(body, settings_of(person, settings)));
+    whole.others.push_back(motion_beside(body, person, whole, whole_settings));
+  }
   const Gaussians scene = synthetic_scene(settings, whole.plan);
   stop_if_asked(observer);
   write_ply(out.file("scene.ply"), scene);
-  write_avatar(out.file("avatar.safetensors"), avatar);
+  write_avatar(out.file("avatar.safetensors"), avatars.front());
+  for (std::size_t p = 1; p < avatars.size(); ++p)
+    write_avatar(out.file(folder_of_person(settings.people[p - 1].first) / "avatar.safetensors"), avatars[p]);
   if (object.exists()) write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
   write_text_file(out.file(kSyntheticFile), synthetic_settings_json(settings, body_settings));
   const TriangleMesh solids = synthetic_solids(settings, whole.plan);
@@ -295,7 +348,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_text_file(out.file("config.json"), to_json(merged(data, more_sections)));
 
   const std::vector<SyntheticClip> clips =
-      cut_into_clips(whole, whole_settings, settings.clips, {scene, object, avatar});
+      cut_into_clips(whole, whole_settings, settings.clips, {scene, object, avatars.front()});
   Progress shown("frames", settings.frames * settings.clips, observer.progress, observer.progress_interval);
   for (Index k = 0; k < settings.clips; ++k) {
     const auto& clip = clips[static_cast<std::size_t>(k)];
@@ -303,7 +356,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
     noise.seed += k;
     const ClipFiles files{out, folder_of(k, settings.clips)};
     write_states(files, clip, object, noise);
-    Film film(settings, render, body, avatar, scene, object);
+    Film film(settings, render, body, avatars, scene, object);
     write_frames(files, clip, object, noise, film, [&] {
       shown.step();
       stop_if_asked(observer);

@@ -6,6 +6,8 @@
 //   first_frame.png                                              frame 0, exact to 8 bit
 //   masks/human/0000.png ...  masks/NAME/0000.png ...            8 bit grey: the share of the pixel
 //   camera.json  initial.json  initial_motion.npz                frame 0 exact, later frames disturbed
+//   people/NAME/avatar.safetensors, initial.json, initial_motion.npz   people beside the first one (synthetic.people);
+//   masks/NAME/0000.png ...  truth/motion_of_NAME.npz
 //   initial_objects.npz                               poses of the object, disturbed; only with object_noise_*
 //   config.json                                                  a run config that names all this
 //   synthetic.json                                               the settings that it was made with

@@ -107,8 +107,10 @@ void RevealedContent::apply(SyntheticFrame& frame) {
   }
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      const double now = std::min(1.0, double(frame.human_mask(0, y, x)) +
-                                           (frame.object_mask.empty() ? 0.0 : double(frame.object_mask(0, y, x))));
+      double shown =
+          double(frame.human_mask(0, y, x)) + (frame.object_mask.empty() ? 0.0 : double(frame.object_mask(0, y, x)));
+      for (const Image& mask : frame.other_masks) shown += double(mask(0, y, x));
+      const double now = std::min(1.0, shown);
       float& covered = covered_(0, y, x);
       const double share = strength_ * std::max(0.0, double(covered) - now);
       covered = std::max(covered, static_cast<float>(now));

@@ -300,6 +300,21 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
   return clip;
 }
 
+Motion motion_beside(const BodyModel& body, const SyntheticPerson& person, const SyntheticClip& first,
+                     const ClipSettings& settings) {
+  ClipSettings own = settings;
+  own.motion = person.motion;
+  own.place = nullptr;
+  own.variation = {};
+  own.variation.begin = person.begin;
+  const SyntheticClip clip = synthetic_clip(body, SyntheticObject(), own);
+  const Vector2<double> from = clip.plan.middle, to = first.plan.middle + Vector2<double>(person.beside.data());
+  Rigid<double> moved;
+  moved.rotation = so3_exp(Vector(0, 0, person.turn_deg * kDegree));
+  moved.translation = Vector(to[0], to[1], 0) - moved.rotation * Vector(from[0], from[1], 0);
+  return transformed(clip.motion, moved, *clip.motion.pelvis_rest);
+}
+
 const char* motion_summary(SyntheticMotionKind motion) {
   switch (motion) {
     case SyntheticMotionKind::kPour:

@@ -58,6 +58,7 @@ Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& sett
 struct SyntheticClip {
   Motion motion;
   std::vector<Rigid<double>> object;  ///< world_from_object, a frame; empty without an object
+  std::vector<Motion> others{};       ///< of the people beside the first one
   std::vector<Camera> cameras;
   ScenePlan plan;  ///< what has to stand where
 };
@@ -69,6 +70,11 @@ struct SyntheticClip {
 /// Throws InternalError when the body has other joints or there is no frame; UserError when the motion makes no sense
 /// with the object.
 SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& object, const ClipSettings& settings);
+
+/// The motion of a person beside the first one of a clip, on as many frames.
+/// @param settings  of that clip
+Motion motion_beside(const BodyModel& body, const SyntheticPerson& person, const SyntheticClip& first,
+                     const ClipSettings& settings);
 
 /// World rotation and position of a joint of a posed body: the frame that things in the hand are fixed to.
 Rigid<double> joint_frame(const BodyModel& body, const BodyPose& pose, int joint);

@@ -47,7 +47,8 @@ SplatInputs<float> avatar_splats(Tape<float>& tape, const Avatar& avatar, const 
 }  // namespace
 
 SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double>& world_from_object,
-                                        const Camera& camera, int supersample) const {
+                                        const Camera& camera, int supersample,
+                                        const std::vector<DrawnPerson>& others) const {
   const SplatView view{resized(camera, camera.width * supersample, camera.height * supersample), room_.origin_world,
                        settings_};
   Tape<float> tape;
@@ -55,10 +56,16 @@ SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double
   std::vector<SplatInputs<float>> parts = {standing_splats(constants(tape, room_), xi, view)};
   if (object_.count() > 0) parts.push_back(object_splats(tape, object_, world_from_object, xi, view));
   parts.push_back(avatar_splats(tape, avatar_, pose));
-  const Index first = room_.count(), second = first + object_.count(), end = second + avatar_.count();
+  const Index first = room_.count(), second = first + object_.count();
+  Index end = second + avatar_.count();
   RenderRequest request;
   request.groups = {{second, end}};
   if (object_.count() > 0) request.groups.push_back({first, second});
+  for (const DrawnPerson& other : others) {
+    parts.push_back(avatar_splats(tape, other.avatar, other.pose));
+    request.groups.push_back({end, end + other.avatar.count()});
+    end += other.avatar.count();
+  }
   const Rendered<float> rendered =
       render(stacked_splats(parts), xi, tape.constant("background", shape_of(1, 3)), view, request);
   tape.forward(rendered.image);
@@ -66,8 +73,12 @@ SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double
   const auto reduced = [&](Var<float> var, int plane, int count) {
     return resize_area(held_image(tape.value(var), plane, count), camera.height, camera.width);
   };
-  Image object_mask = object_.count() > 0 ? reduced(rendered.group_opacity, 1, 1) : Image();
-  return {reduced(rendered.image, 0, 3), reduced(rendered.group_opacity, 0, 1), std::move(object_mask)};
+  SyntheticFrame frame{reduced(rendered.image, 0, 3), reduced(rendered.group_opacity, 0, 1), Image()};
+  int plane = 1;
+  if (object_.count() > 0) frame.object_mask = reduced(rendered.group_opacity, plane++, 1);
+  for (std::size_t p = 0; p < others.size(); ++p)
+    frame.other_masks.push_back(reduced(rendered.group_opacity, plane++, 1));
+  return frame;
 }
 
 }  // namespace hsi4d

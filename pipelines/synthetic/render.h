@@ -14,12 +14,19 @@ namespace hsi4d {
 
 /// One frame as a camera would have seen it.
 struct SyntheticFrame {
-  Image color;        ///< [3,H,W] in [0, 1]
-  Image human_mask;   ///< [1,H,W] share of each pixel that shows the human, what hides it included
-  Image object_mask;  ///< [1,H,W] as human_mask; empty without an object
+  Image color;                       ///< [3,H,W] in [0, 1]
+  Image human_mask;                  ///< [1,H,W] share of each pixel that shows the human, what hides it included
+  Image object_mask;                 ///< [1,H,W] as human_mask; empty without an object
+  std::vector<Image> other_masks{};  ///< [1,H,W] likewise, of people beside the first one
 };
 
-/// Draws a room, one object and an avatar in single precision.
+/// A person beside the first one.
+struct DrawnPerson {
+  const Avatar& avatar;
+  const BodyPose& pose;
+};
+
+/// Draws a room, one object and people in single precision.
 class SyntheticRenderer {
  public:
   /// All four arguments are kept by reference and must outlive the renderer.
@@ -29,7 +36,7 @@ class SyntheticRenderer {
 
   /// @param supersample  rendered at this multiple of the camera's size and reduced by area
   SyntheticFrame frame(const BodyPose& pose, const Rigid<double>& world_from_object, const Camera& camera,
-                       int supersample) const;
+                       int supersample, const std::vector<DrawnPerson>& others = {}) const;
 
  private:
   const Gaussians& room_;

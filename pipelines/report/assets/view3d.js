@@ -68,6 +68,8 @@ const startView3d = async () => {
     .flatMap(t => poseSkeleton(data, "body", t).places.map(place => place[2])));
   const pairs = list => list.slice(1).flatMap((point, i) => [list[i], point]);
   const path = pairs(Array.from({ length: frames }, (_, t) => centerOf(cameraOf(t))));
+  const others = [];  // people beside the first one
+  while (data[`others/${others.length + 1}/translations`]) others.push(`others/${others.length + 1}`);
   const hasTruth = !!data["truth/translations"];
   const shows = name => get("show-" + name)?.checked;
   if (!drawMesh) get("show-skeleton").checked = true;
@@ -133,10 +135,9 @@ const startView3d = async () => {
     }
     const cut = shows("cut") && !eye.follows ? Math.max(0.05, eye.distance - 0.9) : 0.05;
     drawSplats(camera, worlds, worlds.map((_, part) => shows(part === 0 ? "scene" : "objects")), cut);
-    if (shows("skeleton")) {
-      gl.disable(gl.DEPTH_TEST);
-      drawLines(camera, bones(body.places), colors3d.skeleton);
-    }
+    gl.disable(gl.DEPTH_TEST);
+    if (shows("skeleton")) drawLines(camera, bones(body.places), colors3d.skeleton);
+    for (const other of others) drawLines(camera, bones(poseSkeleton(data, other, t).places), colors3d.body);
     canvas.dataset.frame = t;
     canvas.dataset.drawn = 1 + +(canvas.dataset.drawn ?? 0);
   };

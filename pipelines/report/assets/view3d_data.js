@@ -49,9 +49,11 @@ const matrixOf = ({ rotation: r, translation: t }) =>
   new Float32Array([r[0], r[3], r[6], 0, r[1], r[4], r[7], 0, r[2], r[5], r[8], 0, t[0], t[1], t[2], 1]);
 const identity = { rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [0, 0, 0] };
 
-// The skeleton of `name` (body, truth) in frame t: rows [3,4] of posed_from_rest by joint, and the joints' places.
+// The skeleton of `name` (body, truth, others/1) in frame t: rows [3,4] of posed_from_rest by joint, and the joints'
+// places.
 const poseSkeleton = (data, name, t) => {
-  const rest = data["skeleton/joints"], parents = data["skeleton/parents"], joints = parents.length;
+  const rest = data[name + "/joints"] ?? data["skeleton/joints"];
+  const parents = data["skeleton/parents"], joints = parents.length;
   const quaternions = data[name + "/rotations"], move = [...data[name + "/translations"].subarray(3 * t, 3 * t + 3)];
   const rotations = [], places = [], transforms = new Float32Array(12 * joints);
   for (let j = 0; j < joints; ++j) {

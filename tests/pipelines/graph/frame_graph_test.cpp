@@ -124,7 +124,7 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
   CHECK(clip.avatar.count() <= 2 * kSmplxJoints);
   const ColorNet net = some_color_net(clip.avatar);
   FrameGraphSettings settings = smooth_settings(rotations);
-  settings.color_net = &net;
+  settings.color_nets = {&net, 1};
   settings.color_camera_gradient = true;
   Tape<double> tape;
   FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
@@ -251,7 +251,7 @@ TEST_CASE("image, loss and every gradient have the same bits for any number of t
   const ColorNet net = some_color_net(clip.avatar);
   FrameGraphSettings settings;
   settings.object_opacity = true;
-  settings.color_net = &net;
+  settings.color_nets = {&net, 1};
   settings.color_camera_gradient = true;
   FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, settings);
   graph.set_state(clip.first);
@@ -298,7 +298,7 @@ TEST_CASE("gradients through the human's colours are stopped where the settings 
   const auto gradients = [&](const ColorNet* of, bool camera) {
     FrameGraphSettings settings;
     settings.object_opacity = true;
-    settings.color_net = of;
+    if (of != nullptr) settings.color_nets = {of, 1};
     settings.color_camera_gradient = camera;
     Tape<double> tape;
     FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);

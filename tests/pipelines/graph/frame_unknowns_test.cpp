@@ -41,7 +41,7 @@ FrameGraphSettings settings_of(const std::vector<std::string>& unknowns, const C
   settings.object_opacity = true;
   settings.human_opacity = true;
   settings.unknowns = unknowns;
-  settings.color_net = net;
+  if (net != nullptr) settings.color_nets = {net, 1};
   return settings;
 }
 

@@ -90,6 +90,25 @@ TEST_CASE("the file of the 3D view has the motion of camera, objects and body") 
   CHECK(intrinsics[2] == Approx(clip.camera.fx));
 }
 
+TEST_CASE("the file of the 3D view has the people beside the first one, each with its own skeleton") {
+  Clip clip = small_clip(64, 48, 30);
+  std::vector<SceneState> states = two_states(clip);
+  CHECK_FALSE(Safetensors::decode(view3d_file(clip, states, nullptr).encode(), "view").has("others/1/joints"));
+  clip.others.emplace_back().avatar = clip.avatar;
+  for (double& place : clip.others[0].avatar.joints) place *= 1.25;
+  for (std::size_t t = 0; t < 2; ++t) {
+    states[t].others = {states[1 - t].body};
+    states[t].others[0].transl[0] += 0.5;
+  }
+  const Safetensors file = Safetensors::decode(view3d_file(clip, states, nullptr).encode(), "view");
+  const auto joints = file.array("others/1/joints").as<float>();
+  CHECK(joints[5] == Approx(clip.others[0].avatar.joints[5]));
+  const auto places = file.array("others/1/translations").require_shape({2, 3}).as<float>();
+  CHECK(places[0] == Approx(states[0].others[0].transl[0]));
+  CHECK(file.array("others/1/rotations").shape() == std::vector<std::int64_t>{2, kSmplxJoints, 4});
+  CHECK_FALSE(file.has("others/2/joints"));
+}
+
 TEST_CASE("the file of the 3D view has the true body where it is known, and its mesh") {
   Clip clip = small_clip(64, 48, 30);
   const std::vector<SceneState> states = two_states(clip);

@@ -401,8 +401,8 @@ TEST_CASE("every shipped config of a generated dataset runs", "[run][full]") {
     const std::string stem = fs::path(name).stem().string();
     if (check_shipped_config(shipped_configs() / "synthetic" / name, stem, true)) with_stages.insert(stem);
   }
-  CHECK(with_stages ==
-        std::set<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "gate", "hidden", "table", "walk"});
+  CHECK(with_stages == std::set<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "gate", "hidden",
+                                             "table", "two_people", "walk"});
 }
 
 TEST_CASE("every shipped config of a benchmark runs", "[run]") {

@@ -84,7 +84,7 @@ Image drawn(const RunConfig& config, const Clip& clip, const SceneState& state, 
   FrameGraphSettings settings;
   settings.render = config.render;
   settings.background = Vector3<double>(config.background.data());
-  settings.color_net = &net;
+  settings.color_nets = {&net, 1};
   Tape<float> tape;
   FrameGraph<float> graph(tape, clip, state.camera_from_world, settings);
   graph.set_state(state);

@@ -306,10 +306,71 @@ TEST_CASE("every scene with motion and object makes a dataset") {
   }
 }
 
+TEST_CASE("people beside the first one have files of their own, and leave those of all else as they were") {
+  const TemporaryFolder folder;
+  SyntheticSettings settings = small_settings();
+  write_dataset(settings, video_render_settings(), folder.path() / "one");
+  SyntheticPerson person;
+  person.motion = SyntheticMotionKind::kWave;
+  person.beside = {-0.4, 0.8};
+  person.turn_deg = 30;
+  settings.people.emplace_back("friend", person);
+  write_dataset(settings, video_render_settings(), folder.path() / "two");
+  const std::map<std::string, std::string> one = content_of(folder.path() / "one"),
+                                           two = content_of(folder.path() / "two");
+  for (const char* file : {"avatar.safetensors", "initial.json", "initial_motion.npz", "scene.ply", "camera.json",
+                           "truth/motion.npz", "truth/objects.npz", "truth/cameras.json"})
+    CHECK(one.at(file) == two.at(file));
+  CHECK(one.at("first_frame.png") != two.at("first_frame.png"));
+  CHECK(one.at("synthetic.json").find("people") == std::string::npos);
+  CHECK(two.at("config.json").find("people/friend/avatar.safetensors") != std::string::npos);
+  CHECK(two.size() == one.size() + 7);  // avatar, initial state and motion, truth, a mask a frame
+
+  const fs::path made = folder.path() / "two";
+  const DataSettings data = dataset_inputs(made);
+  REQUIRE(data.people.size() == 1);
+  CHECK(data.people[0].first == "friend");
+  const Clip clip = read_clip(data);
+  REQUIRE(clip.others.size() == 1);
+  CHECK(clip.others[0].avatar.colors != clip.avatar.colors);
+  CHECK(clip.first.others[0].transl == (*clip.truth)[0].others[0].transl);
+  CHECK(clip.others[0].estimate[1].transl != (*clip.truth)[1].others[0].transl);
+  const Vector3<double> apart = clip.first.others[0].transl - clip.first.body.transl;
+  CHECK(apart.head<2>().norm() == Approx(std::hypot(0.4, 0.8)).margin(0.3));
+  const ClipFrame frame = read_frame(clip, 0);
+  double both = 0, other = 0;
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 48; ++x) {
+      other += static_cast<double>(frame.other_masks.at(0)(0, y, x));
+      both = std::max(both, static_cast<double>(frame.human_mask(0, y, x) + frame.other_masks[0](0, y, x)));
+    }
+  }
+  CHECK(other > 20);       // pixels
+  CHECK(both < 1 + 0.02);  // each pixel shows one of them
+}
+
+TEST_CASE("people whom synth cannot make are refused") {
+  const TemporaryFolder here;
+  const auto refused = [&here](const std::string& people, const std::string& more) {
+    here.write("config.json", R"({"synthetic": {"people": )" + people + more + "}}");
+    const ProgramResult result = run_hsi4d({"synth", "config.json", "--out", "data"});
+    CHECK(result.status == 2);
+    return result.err;
+  };
+  CHECK(
+      refused(R"({"friend": {"motion": "pour"}})", "").find("needs an object or a place; allowed: walk, wave, lean") !=
+      std::string::npos);
+  CHECK(refused(R"({"human": {}})", "").find("the first person's or the object's masks; use another name") !=
+        std::string::npos);
+  CHECK(refused(R"({"friend": {}})", R"(, "clips": 2)").find("the clips of a chain show one person") !=
+        std::string::npos);
+  CHECK(refused(R"({"friend": {"heading": 1}})", "").find("/synthetic/people/friend/heading") != std::string::npos);
+}
+
 TEST_CASE("every shipped config of synth makes its dataset") {
   const TemporaryFolder folder;
   CHECK(made_of_configs("synthetic") == std::vector<std::string>{"alone", "chain", "disturbed", "faults", "full_size",
-                                                                 "gate", "hidden", "table", "walk"});
+                                                                 "gate", "hidden", "table", "two_people", "walk"});
 }
 
 TEST_CASE("every shipped clip of the accuracy table makes its dataset", "[release]") {
