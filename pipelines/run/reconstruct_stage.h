@@ -68,7 +68,7 @@ StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, 
 StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
                                     const StageGradcheckOptions& options = {});
 
-/// The color nets that a run begins with, by person; none where one of the people has none.
+/// The color nets that a run begins with, by person; none where a person has none (check_run_clip: then nobody has).
 std::vector<ColorNet> first_nets(const RunConfig& config, const Clip& clip);
 
 /// A state as its own camera sees it.

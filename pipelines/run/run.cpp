@@ -224,8 +224,24 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   return clip;
 }
 
+namespace {
+
+/// Color nets are of all people, or of none.
+void check_color_nets(const RunConfig& config, const Clip& clip) {
+  const bool has_net = clip.avatar.color_net.has_value();
+  for (const ClipPerson& person : clip.others) {
+    if (config.color_net.use != ColorNetUse::kAuto || person.avatar.color_net.has_value() == has_net) continue;
+    throw UserError("/color_net/use: \"auto\": the avatar of " + (has_net ? person.name : clip.name) +
+                    " has no color net, unlike that of " + (has_net ? clip.name : person.name) +
+                    "; allowed: \"on\", a new one where there is none, or \"off\"");
+  }
+}
+
+}  // namespace
+
 void check_run_clip(const RunConfig& config, const Clip& clip) {
   check_start(config.start, clip);
+  check_color_nets(config, clip);
   check_first_view(clip, config.data.camera.string());
   check_frames(config.data, clip, losses_over_masks(config));
 }

@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/avatar.h"
 #include "body/motion_io.h"
 #include "core/check.h"
 #include "optim/stage_gradcheck.h"
@@ -183,6 +184,15 @@ TEST_CASE("files of people that do not fit are named", "[run][people]") {
   fs::rename(clip.path / "truth" / "motion_of_friend.npz", clip.path / "elsewhere.npz");
   CHECK_THAT(message_of(clip), Contains("motion_of_friend.npz"));
   fs::rename(clip.path / "elsewhere.npz", clip.path / "truth" / "motion_of_friend.npz");
+  const std::string avatar_file = (clip.path / "people" / "friend" / "avatar.safetensors").string();
+  Avatar avatar = read_avatar(avatar_file);
+  avatar.color_net = new_color_net(avatar.means, avatar.joint_count(), {});
+  write_avatar(avatar_file, avatar);
+  CHECK_THAT(message_of(clip),
+             Contains("/color_net/use: \"auto\": the avatar of human has no color net, unlike that of "
+                      "friend; allowed: \"on\""));
+  avatar.color_net.reset();
+  write_avatar(avatar_file, avatar);
   const fs::path initial = clip.path / "people" / "friend" / "initial.json";
   write_changed(initial, initial, [](nlohmann::ordered_json& state) {
     state["objects"]["vase"] = {{"rotation", {0, 0, 0}}, {"translation", {0, 0, 0}}};
