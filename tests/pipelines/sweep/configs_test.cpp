@@ -73,7 +73,7 @@ struct Reading {
 constexpr Reading kReadings[] = {
     {"increment_camera", "/camera/increment", "camera"},
     {"increment_world", "/camera/increment", "world"},
-    {"center_ndc", "/stages/interaction/losses/center/unit", "ndc"},
+    {"center_pixels", "/stages/interaction/losses/center/unit", "pixels"},
     {"center_widths", "/stages/interaction/losses/center/unit", "widths"},
     {"center_l1", "/stages/interaction/losses/center/norm", "l1"},
     {"center_moves_all", "/stages/interaction/losses/center/moves", "all"},
@@ -122,31 +122,36 @@ TEST_CASE("the sweeps of AnyInteraction have the clips that the paper scores: al
   }
   CHECK(statics.size() == 11);
   CHECK(dynamics.size() == 9);
-  for (const char* of : {"anyinteraction_", "anyinteraction_best_"}) {
-    INFO(of);
-    CHECK(clips_of(std::string(of) + "static.json") == statics);
-    CHECK(clips_of(std::string(of) + "dynamic.json") == dynamics);
-  }
+  CHECK(clips_of("anyinteraction_static.json") == statics);
+  CHECK(clips_of("anyinteraction_dynamic.json") == dynamics);
   std::map<std::string, std::set<std::string>> both = statics;
   both.merge(dynamics);
   CHECK(clips_of("ablations.json") == both);
 }
 
-TEST_CASE("the sweeps of AnyInteraction by best.json have its method without its refinement, and the paper's clips") {
-  nlohmann::json method = method_of(resolved_file(shipped("best.json")));
-  REQUIRE(method["stages"].erase("refinement") == 1);
-  for (const char* kind : {"static.json", "dynamic.json"}) {
-    INFO(kind);
-    const SweepPlan& paper = plan_of(shipped(std::string("sweeps/anyinteraction_") + kind));
-    const SweepPlan& best = plan_of(shipped(std::string("sweeps/anyinteraction_best_") + kind));
-    REQUIRE(best.runs.size() == paper.runs.size());
-    for (std::size_t i = 0; i < best.runs.size(); ++i) {
-      INFO(i);
-      CHECK(best.runs[i].dataset == paper.runs[i].dataset);  // the same video of the same seed
-      CHECK_FALSE(best.runs[i].dataset.empty());
-      CHECK(nlohmann::json::diff(method, method_of(best.runs[i].config)).dump() == "[]");
-    }
+TEST_CASE(
+    "the table of AnyInteraction has the paper's clips, by its schedule and by best.json without its refinement") {
+  nlohmann::json best = method_of(resolved_file(shipped("best.json")));
+  REQUIRE(best["stages"].erase("refinement") == 1);
+  std::map<std::string, nlohmann::json> methods = {
+      {"paper", method_of(resolved_file(shipped("anyinteraction/base.json")))}, {"best", best}};
+  std::map<std::string, std::set<std::string>> clips, datasets;
+  for (const SweepRun& run : plan_of(shipped("sweeps/anyinteraction_table.json")).runs) {
+    INFO(run.block << ", " << run.clip << ", " << run.seed);
+    clips[run.block].insert(run.clip);
+    datasets[run.clip + run.seed].insert(run.dataset);
+    CHECK(nlohmann::json::diff(methods[run.block.substr(0, run.block.find('_'))], method_of(run.config)).dump() ==
+          "[]");
   }
+  for (const char* kind : {"static", "dynamic"}) {
+    std::set<std::string> of_paper;
+    for (const SweepRun& run : plan_of(shipped(std::string("sweeps/anyinteraction_") + kind + ".json")).runs)
+      of_paper.insert(run.clip);
+    CHECK(clips[std::string("paper_") + kind] == of_paper);
+    CHECK(clips[std::string("best_") + kind] == of_paper);
+  }
+  CHECK(clips.size() == 4);
+  for (const auto& [of, made] : datasets) CHECK(made.size() == 1);  // the same video of the same seed
 }
 
 TEST_CASE("the sweep of the ablations and the configs of them leave out the same", "[release]") {
@@ -164,7 +169,7 @@ TEST_CASE("the sweep of the ablations and the configs of them leave out the same
     CHECK(nlohmann::json::diff(in_sweep[in_block], method).dump() == "[]");
     CHECK(method != in_sweep[in_block == name ? "whole" : "paper, whole"]);
   }
-  CHECK(in_sweep.size() == configs + 2 + std::size(kReadings));  // and what they are compared with
+  CHECK(in_sweep.size() == configs + 3 + std::size(kReadings));  // two to compare with, and constant_rates
   for (const auto& [name, method] : ablations_of("ablation_table.json")) {
     INFO(name);
     REQUIRE(in_sweep.contains(name));
@@ -185,6 +190,12 @@ TEST_CASE("the ablations of paper.json are its readings, each a word away", "[re
     const std::string value = changes[0]["value"];
     CHECK(value.ends_with(reading.word));
     CHECK((value == reading.word || fs::exists(value)));
+  }
+  const nlohmann::json rates = nlohmann::json::diff(paper, in_sweep["paper, constant_rates"]);
+  CHECK(rates.size() == 7);  // of all groups of the second stage but the color net
+  for (const nlohmann::json& change : rates) {
+    CHECK(change["path"].get<std::string>().ends_with("/lr_final_share"));
+    CHECK(change["value"] == 1);
   }
 }
 
