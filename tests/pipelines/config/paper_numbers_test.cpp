@@ -106,7 +106,8 @@ TEST_CASE("the paper's numbers are those of its configs") {
     CHECK(config["stages"]["refinement"]["losses"]["fit"]["joints"] == "mean");  // Alg. 1: the L2 of the camera's loss
     CHECK(config["stages"]["refinement"]["losses"]["smooth"]["frames"] == "sum");  // S4: no 1/T before L_smooth
     CHECK(config["camera"]["increment"] == "scene");
-    for (const auto& [name, group] : config["stages"]["interaction"]["optimize"].items())  // C.2 has where rates begin
+    for (const auto& [name, group] :
+         config["stages"]["interaction"]["optimize"].items())  // inferred: C.2 has one number
       CHECK(group["lr_final_share"] == (name == "color_net" ? 1 : 0.1));
     const Json& center = config["stages"]["interaction"]["losses"]["center"];
     CHECK(center["unit"] == "ndc");

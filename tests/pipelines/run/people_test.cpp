@@ -159,17 +159,19 @@ TEST_CASE("people who are named wrongly are refused", "[run][people]") {
 
 TEST_CASE("what knows of one person is refused with two, and told", "[run][people]") {
   const TwoPeople clip;
-  CHECK_THAT(message_of(clip, {"uncertainty=true"}), Contains("/uncertainty: is told of one person; allowed: false"));
-  CHECK_THAT(message_of(clip, {"sources.motion.program=embedded"}), Contains("/sources: programs know one person"));
+  CHECK_THAT(message_of(clip, {"uncertainty=true"}),
+             Contains("/uncertainty: /data/people names more people, and this is told of one person; allowed: false"));
+  CHECK_THAT(message_of(clip, {"sources.motion.program=embedded"}),
+             Contains("/sources: /data/people names more people, and this knows one person"));
   CHECK_THAT(message_of(clip, {"data.tracks=" + (clip.path / "initial_motion.npz").string()}),
-             Contains("/data/tracks: points are followed on one person"));
+             Contains("/data/tracks: /data/people names more people, and this follows points of one person"));
   clip.change_config([](nlohmann::ordered_json& config) {
     config["stages"]["found"] = nlohmann::ordered_json::parse(
         R"({"over": "first_frame", "headings": 4, "iterations": 1,
             "optimize": {"transl": {"lr": 0.01}, "betas": {"lr": 0.01}}, "losses": {"photometric": {}}})");
   });
-  CHECK_THAT(message_of(clip), Contains("/headings: are tried of one person; allowed: 1") &&
-                                   Contains("/optimize/betas: are of one person; leave the group out"));
+  CHECK_THAT(message_of(clip), Contains("this is tried of one person; allowed: 1") &&
+                                   Contains("this is of one person; leave the group out"));
 }
 
 TEST_CASE("files of people that do not fit are named", "[run][people]") {
