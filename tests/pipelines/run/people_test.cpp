@@ -174,6 +174,17 @@ TEST_CASE("what knows of one person is refused with two, and told", "[run][peopl
                                    Contains("this is of one person; leave the group out"));
 }
 
+TEST_CASE("joints of keypoints are told of those of a further person alone too", "[run][people]") {
+  const TwoPeople clip;
+  const std::vector<std::string> joints = {"data.keypoint_joints=" + (clip.path / "initial.json").string()};
+  const std::string without = "/data/keypoint_joints: given without /data/keypoints";
+  CHECK_THAT(message_of(clip, joints), Contains(without));
+  clip.change_config([&](nlohmann::ordered_json& config) {
+    config["data"]["people"]["friend"]["keypoints"] = (clip.path / "initial.json").string();
+  });
+  CHECK_THAT(message_of(clip, joints), !Contains(without) && Contains("initial.json"));  // which has no keypoints
+}
+
 TEST_CASE("files of people that do not fit are named", "[run][people]") {
   const TwoPeople clip;
   const fs::path masks = clip.path / "masks" / "friend";
