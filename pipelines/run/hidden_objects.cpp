@@ -109,9 +109,9 @@ double shown_share(const Clip& clip, double pixels, std::size_t object, const Sc
 
 }  // namespace
 
-std::string carrier_text(const Carrier& carrier) {
+std::string carrier_text(const Clip& clip, const Carrier& carrier) {
   if (!carrier.joint) return "stays where it was";
-  return "stays with the chest" + (carrier.person == 0 ? "" : " of person " + std::to_string(carrier.person + 1));
+  return "stays with the chest" + (carrier.person == 0 ? "" : " of " + clip.person(carrier.person).name);
 }
 
 std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double mask_threshold,

@@ -33,8 +33,8 @@ struct Carrier {
   bool operator==(const Carrier&) const = default;
 };
 
-/// "stays with the chest", "stays where it was".
-std::string carrier_text(const Carrier& carrier);
+/// "stays with the chest", "stays with the chest of friend", "stays where it was".
+std::string carrier_text(const Clip& clip, const Carrier& carrier);
 
 /// How much of each object a frame shows: the pixels of its mask over those that it would cover alone, at most 1; 0
 /// for a mask that nowhere reaches the threshold, 1 of an object without masks.

@@ -372,7 +372,7 @@ class Reconstruction {
       const std::string text = "frame " + std::to_string(index) + ": " + clip_.objects[o].name;
       if (is_hidden(index, o)) {
         state = carried;
-        folder_.note(text + " is hidden, and " + carrier_text(carrier));
+        folder_.note(text + " is hidden, and " + carrier_text(clip_, carrier));
       } else if (is_hidden(index - 1, o)) {
         const FoundObject found = find_object(config_, clip_, o, frame, carried, shown, colors);
         state.objects[o] = found.pose;

@@ -94,7 +94,10 @@ TEST_CASE("what stays before the chest while hands move goes with the chest") {
   const std::vector<SceneState> states = walk(clip, {kChest}, held_by(clip, kRightWrist));
   CHECK(carrier_of(clip, 0, {&states[3], &states[2], &states[1], &states[0]}) == Carrier{kChest});
   CHECK(carrier_of(clip, 0, {&states.front()}) == Carrier{kChest});  // touched, and nothing speaks against it
-  CHECK(carrier_text({kChest}) == "stays with the chest");
+  CHECK(carrier_text(clip, {kChest}) == "stays with the chest");
+  Clip two = clip;
+  two.others.emplace_back().name = "friend";
+  CHECK(carrier_text(two, {kChest, 1}) == "stays with the chest of friend");
 }
 
 TEST_CASE("what stands while hands move, or is far from them, goes with the world") {
@@ -105,7 +108,7 @@ TEST_CASE("what stands while hands move, or is far from them, goes with the worl
   far.objects[0].translation += Vector3<double>(0, 0, 3);
   CHECK(carrier_of(clip, 0, pointers(walk(clip, {kRightWrist}, far))) == Carrier{});
   CHECK(carried_pose(clip, {}, 0, touched[0], touched[3]).translation == touched[0].objects[0].translation);
-  CHECK(carrier_text({}) == "stays where it was");
+  CHECK(carrier_text(clip, {}) == "stays where it was");
 }
 
 TEST_CASE("between two frames an object turns and moves evenly as its carrier sees it") {
