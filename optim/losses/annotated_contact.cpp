@@ -13,6 +13,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/nearest.h"
 #include "autodiff/reduce.h"
+#include "autodiff/tape_rows.h"
 #include "core/check.h"
 #include "core/text.h"
 #include "optim/losses/list.h"
@@ -98,19 +99,12 @@ double mean_distance(const MotionStart& motion, const Touching& touching) {
   return sum / static_cast<double>(touching.sets.size());
 }
 
-template <class S>
-Var<S> constant_of(Tape<S>& tape, const char* name, const std::vector<double>& numbers, Index cols) {
-  const Var<S> var = tape.constant(name, shape_of(std::ssize(numbers) / cols, cols));
-  std::transform(numbers.begin(), numbers.end(), tape.write(var).data, [](double x) { return static_cast<S>(x); });
-  return var;
-}
-
 /// The places that are touched, [.,3].
 template <class S>
 Var<S> touched_places(const LossInputs<S>& in, Tape<S>& tape, const Touching& touching) {
   std::vector<Var<S>> parts;
   if (!touching.objects.empty()) parts.push_back(in.object_points(touching.objects));
-  if (!touching.places.empty()) parts.push_back(constant_of(tape, "touched_places", touching.places, 3));
+  if (!touching.places.empty()) parts.push_back(constant_rows(tape, "touched_places", touching.places, 3));
   return parts.size() == 1 ? parts.front() : concat_rows<S>(parts);
 }
 
@@ -133,8 +127,8 @@ LossTerm annotated_contact_loss() {
                                             rounded(1000 * mean_distance(*in.motion, touching), 3) + " mm apart"});
             const Value apart =
                 nearest_pairs(in.body_points(touching.body), touched_places(in, tape, touching), touching.sets);
-            const Value weights = constant_of(tape, "contact_weights", touching.weights, 1);
-            const Value nothing = constant_of(tape, "no_distance", {0}, 1);
+            const Value weights = constant_rows(tape, "contact_weights", touching.weights, 1);
+            const Value nothing = constant_rows(tape, "no_distance", {0}, 1);
             return l2(apart, nothing, weights) * static_cast<double>(apart.shape().count());
           }));
 }

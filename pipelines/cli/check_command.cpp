@@ -10,6 +10,7 @@
 #include "pipelines/cli/text.h"
 #include "pipelines/config/config_kind.h"
 #include "pipelines/config/run_config.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/scan/settings.h"
 #include "pipelines/sweep/plan.h"

@@ -14,7 +14,7 @@
 #include "pipelines/cli/options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/config/run_problems.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/clip.h"

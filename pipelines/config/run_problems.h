@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/config_value.h"
-#include "core/log.h"
 #include "pipelines/config/run_config.h"
 
 namespace hsi4d {
@@ -32,20 +31,6 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use);
 /// Adds them with the places where the settings were written in `tree`, and those of losses that cannot be prepared;
 /// the others are prepared. Problems that may only follow from some that were found before are left out.
 void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use, ConfigProblems& problems);
-
-/// What is no mistake and yet is to be known of a config.
-struct RunNote {
-  LogLevel level;  ///< warning: a setting that does nothing
-  std::string text;
-};
-
-/// Whether a loss is on and means nothing where there are no objects.
-bool is_of_objects(const LossSettings& loss);
-
-/// Losses of objects where there are none, stages over the sequence without a prior, approximations that are on,
-/// settings of `skip` and `approx` that switch others off or do nothing, and of optimisers that are of another kind
-/// than the stage's.
-std::vector<RunNote> run_notes(const RunConfig& config);
 
 /// Prepares the losses of a run. Throws one UserError with every problem of it, a line each.
 void prepare_run(RunConfig& config);

@@ -4,12 +4,12 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
+#include "autodiff/tape_rows.h"
 #include "body/skinning.h"
 #include "body/vposer.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
-#include "pipelines/graph/tape_rows.h"
 
 namespace hsi4d {
 

@@ -5,10 +5,10 @@
 
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
+#include "autodiff/tape_rows.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
-#include "pipelines/graph/tape_rows.h"
 
 namespace hsi4d {
 

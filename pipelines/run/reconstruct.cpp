@@ -32,6 +32,8 @@
 #include "pipelines/run/frame_start.h"
 #include "pipelines/run/heading_starts.h"
 #include "pipelines/run/hidden_objects.h"
+#include "pipelines/run/object_follower.h"
+#include "pipelines/run/picture_errors.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/stage_log.h"
 #include "pipelines/run/start_choice.h"
@@ -122,6 +124,7 @@ class Reconstruction {
         progress_(first_progress(clip_, frame_stages_, first_nets(config, clip))),
         sigmas_(no_sigmas(clip.objects.size())),
         surest_stage_(config.uncertainty ? stage_of_sigmas(config) : std::nullopt),
+        follower_(config, clip, progress_.seen, [&folder](const std::string& text) { folder.note(text); }),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
@@ -129,7 +132,7 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
-    if (progress_.later.empty()) lay_hidden_objects();
+    if (progress_.later.empty()) follower_.lay_hidden(progress_.after_stage.back());
     if (config_.remove_depth_bias && !progress_.bias) remove_bias();
     if (has_later()) {
       run_later_stages();
@@ -169,7 +172,7 @@ class Reconstruction {
   bool has_later() const { return !order_.later.empty(); }
 
   /// Whether frames change after the last one is done.
-  bool are_drawn_again() const { return config_.remove_depth_bias || follows_hidden() || has_later(); }
+  bool are_drawn_again() const { return config_.remove_depth_bias || follower_.is_on() || has_later(); }
 
   /// Steps of the stages [begin, end), each once.
   std::int64_t steps_of(std::size_t begin, std::size_t end) const {
@@ -211,7 +214,7 @@ class Reconstruction {
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
       if (config_.uncertainty && first_stages_ == 0) progress_.sigmas = {sigmas_};
-      if (follows_hidden() && first_stages_ == 0) progress_.seen = {all_seen()};
+      if (follower_.is_on() && first_stages_ == 0) progress_.seen = {follower_.all_seen()};
       const ClipFrame frame = read_frame(clip_, 0);
       warn_of_other_first_frame(render_state(config_, clip_, clip_.first, start_colors_), frame.target);
       add_covered(frame, config_.data, progress_.covered);
@@ -266,7 +269,7 @@ class Reconstruction {
       take_unknowns(s, found, state);
       progress_.first_frame.push_back({state, totals});
     }
-    if (follows_hidden()) progress_.seen = {all_seen()};
+    if (follower_.is_on()) progress_.seen = {follower_.all_seen()};
     end_frame(0, frame, std::vector(frame_stages_, state), begin);
   }
 
@@ -327,128 +330,19 @@ class Reconstruction {
     for (std::size_t s = 0; s < frame_stages_; ++s) {
       if (!has_start && config_.stages[first_stages_ + s].second.draw == Draw::kAll) {
         if (chooses_start(config_.start)) state = chosen_start(index, frame, state, colors);
-        if (follows_hidden()) start_hidden_objects(index, frame, colors, state);
+        if (follower_.is_on()) follower_.start_hidden(index, frame, done, colors, state);
         has_start = true;
       }
       run_in_frame(first_stages_ + s, {index, frame, progress_.covered, done}, state, colors, progress_.totals[s]);
-      if (has_start) carry_hidden_objects(index, done, state);
+      if (has_start) follower_.carry_hidden(index, done, state);
       after.push_back(state);
     }
-    if (follows_hidden() && !has_start) progress_.seen.push_back(all_seen());
+    if (follower_.is_on() && !has_start) progress_.seen.push_back(follower_.all_seen());
     progress_.colors = std::move(colors);
     write_start_image(index, frame);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     end_frame(index, frame, after, begin);
   }
-
-  // ---- Objects that are hidden ----
-
-  /// What the best start is asked of can be seen; what cannot goes with its carrier.
-  bool follows_hidden() const { return config_.start.objects == StartFrom::kBest && !clip_.objects.empty(); }
-
-  std::vector<double> all_seen() const { return std::vector(clip_.objects.size(), 1.0); }
-
-  /// Objects on joints stay on these, whatever shows of them.
-  bool is_hidden(Index frame, std::size_t object) const {
-    return !clip_.objects[object].joint && frame < std::ssize(progress_.seen) &&
-           progress_.seen[static_cast<std::size_t>(frame)][object] < kHiddenBelow;
-  }
-
-  /// Notes what the frame shows of the objects, lets those that it hides go with their carriers, and looks for those
-  /// that it shows again.
-  void start_hidden_objects(Index index, const ClipFrame& frame, const ColorState& colors, SceneState& state) {
-    const std::vector<SceneState>& done = progress_.after_stage.back();
-    progress_.seen.push_back(seen_shares(clip_, frame, config_.data.mask_threshold, state));
-    for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
-      if (!is_hidden(index - 1, o) && !is_hidden(index, o)) continue;
-      const Index last = last_seen(index, o);
-      const SceneState& shown = done[static_cast<std::size_t>(last)];
-      const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, done));
-      SceneState carried = state;
-      carried.objects[o] = carried_pose(clip_, carrier, o, shown, state);
-      double& share = progress_.seen.back()[o];
-      if (share == 0 && is_shown_at(config_, clip_, o, frame, state, colors))  // its mask is missing
-        share = drawn_share(clip_, picture_of_state(config_, clip_, state, colors), o, state);
-      const std::string text = "frame " + std::to_string(index) + ": " + clip_.objects[o].name;
-      if (is_hidden(index, o)) {
-        state = carried;
-        folder_.note(text + " is hidden, and " + carrier_text(clip_, carrier));
-      } else if (is_hidden(index - 1, o)) {
-        const FoundObject found = find_object(config_, clip_, o, frame, carried, shown, colors);
-        state.objects[o] = found.pose;
-        folder_.note(text + " is seen again, " + found.from);
-      }
-    }
-  }
-
-  /// Whatever stages made of objects that the frame hides, these go with their carriers.
-  /// @param known  states by frame: those before, or, of a later pass, of all as the stages before it left them
-  void carry_hidden_objects(Index index, const std::vector<SceneState>& known, SceneState& state) const {
-    for (std::size_t o = 0; follows_hidden() && o < clip_.objects.size(); ++o) {
-      if (!is_hidden(index, o)) continue;
-      const Index last = last_seen(index, o);
-      const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, known));
-      const Index from = std::ssize(known) > index ? index : last;
-      state.objects[o] = carried_pose(clip_, carrier, o, known[static_cast<std::size_t>(from)], state);
-    }
-  }
-
-  /// The last frame before that shows the object; the first one does.
-  Index last_seen(Index before, std::size_t object) const {
-    Index last = before - 1;
-    while (last > 0 && is_hidden(last, object)) --last;
-    return last;
-  }
-
-  /// The states of frames up to `last` that show the object.
-  std::vector<const SceneState*> frames_with(std::size_t object, Index last,
-                                             const std::vector<SceneState>& states) const {
-    std::vector<const SceneState*> seen;
-    for (Index t = 0; t <= last; ++t) {
-      if (!is_hidden(t, object)) seen.push_back(&states[static_cast<std::size_t>(t)]);
-    }
-    return seen;
-  }
-
-  /// Objects that the frame shows elsewhere are looked for from where the frame before has them now, and from the next
-  /// frame that shows them.
-  /// @param known  states by frame, as the stages before the pass left them
-  void look_for_lost_objects(Index index, const ClipFrame& frame, const std::vector<SceneState>& known,
-                             const SceneState& before, SceneState& state) {
-    const StatePicture picture = picture_of_state(config_, clip_, state, progress_.colors);
-    for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
-      const std::optional<double> iou = object_iou(picture, frame, o);
-      if (clip_.objects[o].joint || is_hidden(index, o) || !iou || *iou >= kDoubtfulIou) continue;
-      FoundObject found = find_object(config_, clip_, o, frame, state, before, progress_.colors);
-      state.objects[o] = found.pose;
-      std::string text = "frame " + std::to_string(index) + ", pass " + std::to_string(pass_) + ": " +
-                         clip_.objects[o].name + " is looked for, by frame " + std::to_string(index - 1) + ": " +
-                         found.from;
-      Index next = index + 1;
-      while (next < clip_.frames() && is_hidden(next, o)) ++next;
-      if (next < clip_.frames()) {
-        found = find_object(config_, clip_, o, frame, state, known[static_cast<std::size_t>(next)], progress_.colors);
-        state.objects[o] = found.pose;
-        text += ", by frame " + std::to_string(next) + ": " + found.from;
-      }
-      folder_.note(text);
-    }
-  }
-
-  /// Between two frames that show it a hidden object is on a smooth path.
-  void lay_hidden_objects() {
-    std::vector<SceneState>& states = progress_.after_stage.back();
-    for (std::size_t o = 0; follows_hidden() && o < clip_.objects.size(); ++o) {
-      for (Index t = 1; t < clip_.frames(); ++t) {
-        const Index last = last_seen(t, o);
-        if (is_hidden(t, o) || last == t - 1) continue;
-        const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, states));
-        lay_between(clip_, carrier, o, static_cast<std::size_t>(last), static_cast<std::size_t>(t), states);
-      }
-    }
-  }
-
-  // ---- A frame ----
 
   /// Where the stages that draw everything begin, told in the log.
   SceneState chosen_start(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors) {
@@ -558,11 +452,11 @@ class Reconstruction {
     for (std::size_t t = 1; t < biased.size(); ++t) give_bias(biased[t]);
     SceneState state = biased[static_cast<std::size_t>(index)];
     progress_.colors.nets = colors_after(index).nets;
-    if (follows_hidden()) look_for_lost_objects(index, frame, biased, done.back(), state);
+    if (follower_.is_on()) follower_.look_for_lost({index, pass_}, frame, biased, done.back(), progress_.colors, state);
     for (std::size_t i = l; i < end; ++i) {
       run_in_frame(later_stage() + i, {index, frame, progress_.covered, done}, state, progress_.colors,
                    progress_.later[i].totals);
-      carry_hidden_objects(index, biased, state);
+      follower_.carry_hidden(index, biased, state);
       progress_.later[i].states.push_back(state);
     }
     if (progress_.bias) hsi4d::remove_depth_bias(clip_, *progress_.bias, progress_.later[end - 1].states.back());
@@ -705,21 +599,8 @@ class Reconstruction {
       log_warning((frame ? "frame " + std::to_string(*frame) : "all frames") + ", stage " + stage + ", iteration " +
                   std::to_string(report.iteration) + ": no step, " + std::string(report.offender));
     }
-    IterationRecord record;
-    if (frame) record.frame = static_cast<int>(*frame);
-    record.stage = stage;
-    record.iteration = report.iteration;
-    record.loss = report.loss;
-    for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
-    record.seconds = report.seconds;
-    record.rolled_back = report.rolled_back;
-    record.gradient_shares = report.gradient_shares;
-    record.matrix = report.matrix;
-    if (counters != nullptr) add_counters(*counters, *totals, record);
-    for (const auto& [name, count] : {std::pair{"forward_nodes", report.tape.forward_nodes},
-                                      {"backward_nodes", report.tape.backward_nodes},
-                                      {"adjoint_numbers", report.tape.adjoint_numbers}})
-      record.counters.emplace_back(name, static_cast<double>(count));
+    if (counters != nullptr) add_work(*counters, *totals);
+    const IterationRecord record = iteration_record(frame, stage, report, counters);
     folder_.append_metrics(record);
     if (events_) events_->add(record);
     show(report);
@@ -746,51 +627,10 @@ class Reconstruction {
     throw Interrupted(stop_message(frame, clip_.frames(), first_worked_on()));
   }
 
-  static void add_counters(const RenderCounters& counters, StageTotals& totals, IterationRecord& record) {
+  static void add_work(const RenderCounters& counters, StageTotals& totals) {
     totals.tiles += counters.tiles;
     totals.pairs += counters.pairs;
     totals.fragments += counters.fragments;
-    for (const auto& [name, count] : {std::pair{"channels", counters.channels},
-                                      {"gaussians", counters.gaussians},
-                                      {"tiles", counters.tiles},
-                                      {"pairs", counters.pairs},
-                                      {"groups", counters.groups},
-                                      {"fragments", counters.fragments},
-                                      {"layers", counters.layers},
-                                      {"dirty_tiles", counters.dirty_tiles},
-                                      {"adjoint_tiles", counters.adjoint_tiles}}) {
-      record.counters.emplace_back(name, static_cast<double>(count));
-    }
-  }
-
-  /// 1 where neither masks nor drawn people are.
-  static Image background_beside(const StatePicture& picture, const ClipFrame& frame) {
-    constexpr float kHardlyHuman = 0.02F;
-    Image background = background_of(frame);
-    for (int y = 0; y < background.height(); ++y) {
-      for (int x = 0; x < background.width(); ++x) {
-        const auto is_at = [x, y](const Image& silhouette) { return silhouette(0, y, x) > kHardlyHuman; };
-        if (is_at(picture.silhouette) || std::any_of(picture.others.begin(), picture.others.end(), is_at))
-          background(0, y, x) = 0;
-      }
-    }
-    return background;
-  }
-
-  static MetricValues picture_errors(const StatePicture& picture, const ClipFrame& frame) {
-    const Image foreground = foreground_of(frame);
-    MetricValues errors = image_errors(picture.image, frame.target, &foreground);
-    const MetricValues background = background_errors(picture.image, frame.target, background_beside(picture, frame));
-    errors.insert(errors.end(), background.begin(), background.end());
-    std::vector<FrameMetrics> ious;  // of the people that masks show
-    for (std::size_t p = 0; p <= picture.others.size(); ++p) {
-      const std::optional<double> iou =
-          mask_iou(p == 0 ? picture.silhouette : picture.others[p - 1], frame.person_mask(p));
-      if (iou) ious.push_back({0, {{"silhouette_iou", *iou}}});
-    }
-    const MetricValues mean = mean_errors(ious);
-    errors.insert(errors.end(), mean.begin(), mean.end());
-    return errors;
   }
 
   /// Writes images of a frame's result and notes how far it is from the video.
@@ -803,7 +643,7 @@ class Reconstruction {
     write_image(paths.frame_image(number, "render"), picture.image);
     write_image(paths.frame_image(number, "difference"), difference_image(picture.image, frame.target));
     errors.push_back(picture_errors(picture, frame));
-    if (follows_hidden()) note_object_ious(picture, frame, errors.size());
+    if (follower_.is_on()) note_object_ious(picture, frame, errors.size());
   }
 
   /// @param frames  that are written, this one included
@@ -836,6 +676,7 @@ class Reconstruction {
   TrackPoints tracks_;                       // of the frames that are done, in this pass
   PlaceSigmas sigmas_;                       // of the frame at hand
   std::optional<std::size_t> surest_stage_;  // which tells them
+  const ObjectFollower follower_;
   const ColorState start_colors_;
   Progress bar_;
   std::vector<ProgressPart> terms_;  // of the iteration at hand

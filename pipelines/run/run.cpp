@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/config/parameter_groups.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/draw/plate_mark.h"
 #include "pipelines/draw/visibility.h"

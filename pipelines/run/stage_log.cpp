@@ -5,7 +5,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "optim/metrics.h"
-#include "pipelines/config/run_problems.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/run/hidden_objects.h"
 
@@ -68,6 +68,38 @@ std::string stage_text(const std::string& stage, const StageResult& result, cons
   text += left_out_line(result, clip);
   for (const LossNote& note : result.notes) text += ", " + note.term + ": " + note.text;
   return text;
+}
+
+IterationRecord iteration_record(std::optional<Index> frame, const std::string& stage, const IterationReport& report,
+                                 const RenderCounters* counters) {
+  IterationRecord record;
+  if (frame) record.frame = static_cast<int>(*frame);
+  record.stage = stage;
+  record.iteration = report.iteration;
+  record.loss = report.loss;
+  for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
+  record.seconds = report.seconds;
+  record.rolled_back = report.rolled_back;
+  record.gradient_shares = report.gradient_shares;
+  record.matrix = report.matrix;
+  const auto add = [&record](const char* name, auto count) {
+    record.counters.emplace_back(name, static_cast<double>(count));
+  };
+  if (counters != nullptr) {
+    add("channels", counters->channels);
+    add("gaussians", counters->gaussians);
+    add("tiles", counters->tiles);
+    add("pairs", counters->pairs);
+    add("groups", counters->groups);
+    add("fragments", counters->fragments);
+    add("layers", counters->layers);
+    add("dirty_tiles", counters->dirty_tiles);
+    add("adjoint_tiles", counters->adjoint_tiles);
+  }
+  add("forward_nodes", report.tape.forward_nodes);
+  add("backward_nodes", report.tape.backward_nodes);
+  add("adjoint_numbers", report.tape.adjoint_numbers);
+  return record;
 }
 
 void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "optim/stage.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/input/clip.h"
+#include "pipelines/record/folder.h"
 #include "pipelines/run/checkpoint.h"
 
 namespace hsi4d {
@@ -19,6 +21,12 @@ std::string loss_text(double loss, std::span<const LossValue> terms);
 /// What a stage did: iterations, time, loss before and after, steps not taken, what terms left out and noted.
 /// @param begin  loss_text of the first iteration
 std::string stage_text(const std::string& stage, const StageResult& result, const std::string& begin, const Clip& clip);
+
+/// What metrics.jsonl keeps of an iteration.
+/// @param frame     none: all at once
+/// @param counters  null: nothing was drawn
+IterationRecord iteration_record(std::optional<Index> frame, const std::string& stage, const IterationReport& report,
+                                 const RenderCounters* counters);
 
 /// Every object that a term of a stage left out: one warning, with its frames.
 void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip);

@@ -12,7 +12,7 @@
 #include "core/image_io.h"
 #include "pipelines/cli/check_command.h"
 #include "pipelines/cli/run_command.h"
-#include "pipelines/config/run_problems.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/input/state.h"
 #include "tests/support/tiny_run.h"
 

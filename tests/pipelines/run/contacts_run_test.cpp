@@ -4,7 +4,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "pipelines/config/run_problems.h"
+#include "pipelines/config/run_notes.h"
 #include "tests/support/tiny_run.h"
 
 namespace contacts_run_test {

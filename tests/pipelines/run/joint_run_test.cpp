@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/npz.h"
-#include "pipelines/config/run_problems.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/input/joint_fit.h"
 #include "pipelines/run/depth_bias.h"
 #include "pipelines/run/frame_start.h"

@@ -10,7 +10,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/image_io.h"
-#include "pipelines/config/run_problems.h"
+#include "pipelines/config/run_notes.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/graph/frame_graph.h"
 #include "pipelines/input/state.h"
