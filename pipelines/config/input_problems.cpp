@@ -154,6 +154,7 @@ struct KnownInputs {
   bool video = false, masks = false;  ///< a program outside makes them
   bool camera = false;                ///< it is chosen
   bool state = false;                 ///< frame 0 is that in which another clip ended
+  std::filesystem::path folder = {};  ///< that of an instance, which is not there; empty: none
 };
 
 /// @param in  the section, "/data"
@@ -175,8 +176,10 @@ void add_missing_problems(const DataSettings& data, const std::string& in, const
   if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
     std::vector<std::string> keys;
     for (const Input& input : inputs) keys.emplace_back(input.key);
+    const std::string looked =
+        known.folder.empty() ? "" : ", and /instance/folder is not there (" + known.folder.string() + ")";
     found.push_back({in,
-                     "no inputs are given; a run needs " + joined(keys) +
+                     "no inputs are given" + looked + "; a run needs " + joined(keys) +
                          ". `hsi4d synth` makes a dataset with a config beside it to run; `hsi4d demo` makes one and "
                          "runs it",
                      {in},
@@ -316,7 +319,10 @@ void add_input_problems(const RunConfig& config, ConfigUse use, std::vector<RunP
   if (use == ConfigUse::kRun) {
     const SourceSettings& sources = config.sources;
     add_missing_problems(config.data, "/data",
-                         {.video = !sources.video.command.empty(), .masks = knows_masks(sources, config.data)}, found);
+                         {.video = !sources.video.command.empty(),
+                          .masks = knows_masks(sources, config.data),
+                          .folder = has_data(config.instance) ? "" : config.instance.folder},
+                         found);
   }
 }
 

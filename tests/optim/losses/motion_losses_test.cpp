@@ -320,7 +320,13 @@ TEST_CASE("ground is the squared change of the height of the lowest points of th
   const auto lifted = [&](const BodyPoint& p) -> Vector3<double> {
     return test.start.place(p) + Vector3<double>(0.5, 0, p.frame == kStill ? 0.3 : 0);
   };
-  CHECK(motion_loss("ground", R"({"points": 2})", no_joint, lifted) == Approx(0.09 / 3).epsilon(1e-12));
+  const auto value = [&](const std::string& settings) { return motion_loss("ground", settings, no_joint, lifted); };
+  CHECK(value(R"({"points": 2})") == Approx(0.09 / 3).epsilon(1e-12));
+  CHECK(value(R"({"points": 2, "kernel": "huber", "scale": 0.1})") == Approx((2 * 0.1 * 0.3 - 0.01) / 3).epsilon(1e-6));
+  CHECK(value(R"({"points": 2, "kernel": "geman_mcclure", "scale": 0.1})") ==
+        Approx(0.01 * 0.09 / 0.1 / 3).epsilon(1e-6));
+  CHECK_THROWS_WITH(value(R"({"scale": 0.2})"),
+                    Catch::Contains("/scale: does nothing with kernel \"squared\"; allowed: kernel \"huber\""));
 }
 
 TEST_CASE("foot_sliding counts feet that stood when the stage began") {

@@ -87,6 +87,12 @@ TEST_CASE("inputs that are not given are all told before anything is written", "
   check_refusal(run_hsi4d({"run", "empty.json", "--dry-run"}), both);
   here.write("tiny.json", kTinyStages);
   CHECK(run_hsi4d({"run", "tiny.json", "--out", "run"}).err == "tiny.json:1: " + inputs + "\n");
+  here.write("instance.json",
+             R"({"extends": "tiny.json", "instance": {"scene": "Room", "type": "indoor", "source": "made",
+    "object": "static", "prompt": "A person sits.", "folder": "nowhere"}})");
+  CHECK_THAT(run_hsi4d({"run", "instance.json", "--out", "run"}).err,
+             Contains("/data: no inputs are given, and /instance/folder is not there (" +
+                      (here.path() / "nowhere").string() + "); a run"));
   CHECK(run_hsi4d({"run", tiny_config_file(), "--out", "run", "--set", "data.masks=", "--set", "data.frames="}).err ==
         "2 problems:\n"
         "--set data.masks=: /data/masks: not given; a run needs masks of the human and the objects\n"
