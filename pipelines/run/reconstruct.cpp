@@ -32,7 +32,7 @@
 #include "pipelines/run/frame_start.h"
 #include "pipelines/run/heading_starts.h"
 #include "pipelines/run/hidden_objects.h"
-#include "pipelines/run/object_follower.h"
+#include "pipelines/run/hidden_tracker.h"
 #include "pipelines/run/picture_errors.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/stage_log.h"
@@ -124,7 +124,7 @@ class Reconstruction {
         progress_(first_progress(clip_, frame_stages_, first_nets(config, clip))),
         sigmas_(no_sigmas(clip.objects.size())),
         surest_stage_(config.uncertainty ? stage_of_sigmas(config) : std::nullopt),
-        follower_(config, clip, progress_.seen, [&folder](const std::string& text) { folder.note(text); }),
+        hidden_(config, clip, progress_.seen, [&folder](const std::string& text) { folder.note(text); }),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
@@ -132,7 +132,7 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
-    if (progress_.later.empty()) follower_.lay_hidden(progress_.after_stage.back());
+    if (progress_.later.empty()) hidden_.lay_hidden(progress_.after_stage.back());
     if (config_.remove_depth_bias && !progress_.bias) remove_bias();
     if (has_later()) {
       run_later_stages();
@@ -172,7 +172,7 @@ class Reconstruction {
   bool has_later() const { return !order_.later.empty(); }
 
   /// Whether frames change after the last one is done.
-  bool are_drawn_again() const { return config_.remove_depth_bias || follower_.is_on() || has_later(); }
+  bool are_drawn_again() const { return config_.remove_depth_bias || hidden_.is_on() || has_later(); }
 
   /// Steps of the stages [begin, end), each once.
   std::int64_t steps_of(std::size_t begin, std::size_t end) const {
@@ -214,7 +214,7 @@ class Reconstruction {
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
       if (config_.uncertainty && first_stages_ == 0) progress_.sigmas = {sigmas_};
-      if (follower_.is_on() && first_stages_ == 0) progress_.seen = {follower_.all_seen()};
+      if (hidden_.is_on() && first_stages_ == 0) progress_.seen = {hidden_.all_seen()};
       const ClipFrame frame = read_frame(clip_, 0);
       warn_of_other_first_frame(render_state(config_, clip_, clip_.first, start_colors_), frame.target);
       add_covered(frame, config_.data, progress_.covered);
@@ -269,7 +269,7 @@ class Reconstruction {
       take_unknowns(s, found, state);
       progress_.first_frame.push_back({state, totals});
     }
-    if (follower_.is_on()) progress_.seen = {follower_.all_seen()};
+    if (hidden_.is_on()) progress_.seen = {hidden_.all_seen()};
     end_frame(0, frame, std::vector(frame_stages_, state), begin);
   }
 
@@ -330,14 +330,14 @@ class Reconstruction {
     for (std::size_t s = 0; s < frame_stages_; ++s) {
       if (!has_start && config_.stages[first_stages_ + s].second.draw == Draw::kAll) {
         if (chooses_start(config_.start)) state = chosen_start(index, frame, state, colors);
-        if (follower_.is_on()) follower_.start_hidden(index, frame, done, colors, state);
+        if (hidden_.is_on()) hidden_.start_hidden(index, frame, done, colors, state);
         has_start = true;
       }
       run_in_frame(first_stages_ + s, {index, frame, progress_.covered, done}, state, colors, progress_.totals[s]);
-      if (has_start) follower_.carry_hidden(index, done, state);
+      if (has_start) hidden_.carry_hidden(index, done, state);
       after.push_back(state);
     }
-    if (follower_.is_on() && !has_start) progress_.seen.push_back(follower_.all_seen());
+    if (hidden_.is_on() && !has_start) progress_.seen.push_back(hidden_.all_seen());
     progress_.colors = std::move(colors);
     write_start_image(index, frame);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
@@ -452,11 +452,11 @@ class Reconstruction {
     for (std::size_t t = 1; t < biased.size(); ++t) give_bias(biased[t]);
     SceneState state = biased[static_cast<std::size_t>(index)];
     progress_.colors.nets = colors_after(index).nets;
-    if (follower_.is_on()) follower_.look_for_lost({index, pass_}, frame, biased, done.back(), progress_.colors, state);
+    if (hidden_.is_on()) hidden_.look_for_lost({index, pass_}, frame, biased, done.back(), progress_.colors, state);
     for (std::size_t i = l; i < end; ++i) {
       run_in_frame(later_stage() + i, {index, frame, progress_.covered, done}, state, progress_.colors,
                    progress_.later[i].totals);
-      follower_.carry_hidden(index, biased, state);
+      hidden_.carry_hidden(index, biased, state);
       progress_.later[i].states.push_back(state);
     }
     if (progress_.bias) hsi4d::remove_depth_bias(clip_, *progress_.bias, progress_.later[end - 1].states.back());
@@ -643,7 +643,7 @@ class Reconstruction {
     write_image(paths.frame_image(number, "render"), picture.image);
     write_image(paths.frame_image(number, "difference"), difference_image(picture.image, frame.target));
     errors.push_back(picture_errors(picture, frame));
-    if (follower_.is_on()) note_object_ious(picture, frame, errors.size());
+    if (hidden_.is_on()) note_object_ious(picture, frame, errors.size());
   }
 
   /// @param frames  that are written, this one included
@@ -676,7 +676,7 @@ class Reconstruction {
   TrackPoints tracks_;                       // of the frames that are done, in this pass
   PlaceSigmas sigmas_;                       // of the frame at hand
   std::optional<std::size_t> surest_stage_;  // which tells them
-  const ObjectFollower follower_;
+  const HiddenTracker hidden_;
   const ColorState start_colors_;
   Progress bar_;
   std::vector<ProgressPart> terms_;  // of the iteration at hand

@@ -1,33 +1,33 @@
-#include "pipelines/run/object_follower.h"
+#include "pipelines/run/hidden_tracker.h"
 
 #include <optional>
 #include <utility>
 
 namespace hsi4d {
 
-ObjectFollower::ObjectFollower(const RunConfig& config, const Clip& clip, std::vector<std::vector<double>>& seen,
-                               std::function<void(const std::string&)> note)
+HiddenTracker::HiddenTracker(const RunConfig& config, const Clip& clip, std::vector<std::vector<double>>& seen,
+                             std::function<void(const std::string&)> note)
     : config_(config), clip_(clip), seen_(seen), note_(std::move(note)) {}
 
-bool ObjectFollower::is_on() const { return config_.start.objects == StartFrom::kBest && !clip_.objects.empty(); }
+bool HiddenTracker::is_on() const { return config_.start.objects == StartFrom::kBest && !clip_.objects.empty(); }
 
-std::vector<double> ObjectFollower::all_seen() const { return std::vector(clip_.objects.size(), 1.0); }
+std::vector<double> HiddenTracker::all_seen() const { return std::vector(clip_.objects.size(), 1.0); }
 
-bool ObjectFollower::is_hidden(Index frame, std::size_t object) const {
+bool HiddenTracker::is_hidden(Index frame, std::size_t object) const {
   return !clip_.objects[object].joint && frame < std::ssize(seen_) &&
          seen_[static_cast<std::size_t>(frame)][object] < kHiddenBelow;
 }
 
 /// The last frame before that shows the object; the first one does.
-Index ObjectFollower::last_seen(Index before, std::size_t object) const {
+Index HiddenTracker::last_seen(Index before, std::size_t object) const {
   Index last = before - 1;
   while (last > 0 && is_hidden(last, object)) --last;
   return last;
 }
 
 /// The states of frames up to `last` that show the object.
-std::vector<const SceneState*> ObjectFollower::frames_with(std::size_t object, Index last,
-                                                           const std::vector<SceneState>& states) const {
+std::vector<const SceneState*> HiddenTracker::frames_with(std::size_t object, Index last,
+                                                          const std::vector<SceneState>& states) const {
   std::vector<const SceneState*> shown;
   for (Index t = 0; t <= last; ++t) {
     if (!is_hidden(t, object)) shown.push_back(&states[static_cast<std::size_t>(t)]);
@@ -35,8 +35,8 @@ std::vector<const SceneState*> ObjectFollower::frames_with(std::size_t object, I
   return shown;
 }
 
-void ObjectFollower::start_hidden(Index index, const ClipFrame& frame, const std::vector<SceneState>& done,
-                                  const ColorState& colors, SceneState& state) const {
+void HiddenTracker::start_hidden(Index index, const ClipFrame& frame, const std::vector<SceneState>& done,
+                                 const ColorState& colors, SceneState& state) const {
   seen_.push_back(seen_shares(clip_, frame, config_.data.mask_threshold, state));
   for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
     if (!is_hidden(index - 1, o) && !is_hidden(index, o)) continue;
@@ -60,7 +60,7 @@ void ObjectFollower::start_hidden(Index index, const ClipFrame& frame, const std
   }
 }
 
-void ObjectFollower::carry_hidden(Index index, const std::vector<SceneState>& known, SceneState& state) const {
+void HiddenTracker::carry_hidden(Index index, const std::vector<SceneState>& known, SceneState& state) const {
   for (std::size_t o = 0; is_on() && o < clip_.objects.size(); ++o) {
     if (!is_hidden(index, o)) continue;
     const Index last = last_seen(index, o);
@@ -70,8 +70,8 @@ void ObjectFollower::carry_hidden(Index index, const std::vector<SceneState>& kn
   }
 }
 
-void ObjectFollower::look_for_lost(At at, const ClipFrame& frame, const std::vector<SceneState>& known,
-                                   const SceneState& before, const ColorState& colors, SceneState& state) const {
+void HiddenTracker::look_for_lost(At at, const ClipFrame& frame, const std::vector<SceneState>& known,
+                                  const SceneState& before, const ColorState& colors, SceneState& state) const {
   const StatePicture picture = picture_of_state(config_, clip_, state, colors);
   for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
     const std::optional<double> iou = object_iou(picture, frame, o);
@@ -92,7 +92,7 @@ void ObjectFollower::look_for_lost(At at, const ClipFrame& frame, const std::vec
   }
 }
 
-void ObjectFollower::lay_hidden(std::vector<SceneState>& states) const {
+void HiddenTracker::lay_hidden(std::vector<SceneState>& states) const {
   for (std::size_t o = 0; is_on() && o < clip_.objects.size(); ++o) {
     for (Index t = 1; t < clip_.frames(); ++t) {
       const Index last = last_seen(t, o);

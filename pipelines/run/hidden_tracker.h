@@ -15,7 +15,7 @@ namespace hsi4d {
 
 /// Follows objects where `start.objects` is "best": what the best start is asked of can be seen, what cannot goes with
 /// its carrier. Objects on joints stay on these, whatever shows of them.
-class ObjectFollower {
+class HiddenTracker {
  public:
   /// A frame of a pass.
   struct At {
@@ -25,8 +25,8 @@ class ObjectFollower {
 
   /// @param seen  [frame][object] the share that a frame shows, of the frames that have begun; kept by reference
   /// @param note  told what was done with an object, for the log
-  ObjectFollower(const RunConfig& config, const Clip& clip, std::vector<std::vector<double>>& seen,
-                 std::function<void(const std::string&)> note);
+  HiddenTracker(const RunConfig& config, const Clip& clip, std::vector<std::vector<double>>& seen,
+                std::function<void(const std::string&)> note);
 
   bool is_on() const;
 
