@@ -138,6 +138,11 @@ constexpr StressCase kCases[] = {
     {"G12", "what an approximation supposes holds no longer, unseen", "turns are measured and told", left_ranges},
     {"G13", "an error in rows of little energy is unseen", "the worst row beside the L2", rows_of_little_energy,
      "300 Gaussians, 48 x 32 px"},
+    {"G14", "a Gauss-Newton matrix without full rank", "damped; what it does not see moves by its gradient",
+     matrix_without_rank},
+    {"G15", "a loss that bends down: Newton goes up", "a gradient's length where the matrix has less",
+     loss_that_bends_down},
+    {"G16", "a long step by a matrix ends where nothing is a number", "taken back, damped tenfold", bad_matrix_steps},
     // P: what is not a number, in every slot of every operator
     {"P1", "a bad row makes others bad: elementwise operators", kByIndex, poisoned_elements},
     {"P2", "a bad row makes others bad: arrays, means, images", kByIndex, poisoned_arrays},

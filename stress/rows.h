@@ -32,6 +32,7 @@ Row broken_ply, numbers_in_json;                                                
 Row unusual_sequences, two_results, transmittance_through_layers;                    // lists_and_layers
 Row long_lists, rows_of_little_energy;                                               // lists_and_layers
 Row steps_after_wrap, bad_evaluations, growing_norms, nearly_equal_starts;           // steps
+Row matrix_without_rank, loss_that_bends_down, bad_matrix_steps;                     // matrix_steps
 Row videos_as_players_show_them, resumed_elsewhere, left_ranges;                     // inputs
 Row poisoned_elements, poisoned_arrays, poisoned_networks;                           // poison_autodiff
 Row poisoned_splats;                                                                 // poison_splat
