@@ -24,8 +24,9 @@ struct LeftOut {
 
 /// What a term tells of what it found when it was recorded.
 struct LossNote {
-  std::string term, text;  ///< "hands near an object in 3 of 9 frames"
-  bool is_idle = false;    ///< the term moves nothing in this stage
+  std::string term, text;   ///< "hands near an object in 3 of 9 frames"
+  bool is_idle = false;     ///< the term moves nothing in this stage
+  bool is_of_clip = false;  ///< nor in any other frame, for the same reason
 };
 
 /// What a loss term may read, by name. A Var without a tape stands for what the stage does not have; `given` asks.

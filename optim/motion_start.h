@@ -51,7 +51,10 @@ struct MotionStart {
   PosedJoints first_body;                                          ///< in the clip's first frame
   std::vector<PosedJoints> body;                                   ///< [F]
   std::vector<std::vector<Rigid<double>>> world_from_object = {};  ///< [F][O]
-  std::optional<std::vector<AnnotatedContact>> contacts = {};      ///< in frames that move; none: nobody annotated any
+  /// How far the lower foot goes up and down in the estimate of the whole clip (lower_foot_range), metres; none: there
+  /// is no estimate.
+  std::optional<double> foot_range = {};
+  std::optional<std::vector<AnnotatedContact>> contacts = {};  ///< in frames that move; none: nobody annotated any
 
   Index frames() const { return static_cast<Index>(body.size()); }
   Index moving_frames() const { return frames() - still_frames; }

@@ -41,6 +41,7 @@ std::shared_ptr<const MotionStart> start_of(const Clip& clip, std::size_t person
   start->first_camera_center = inverse(first.camera_from_world).translation;
   start->still_frames = std::ssize(frames) - moving;
   start->frame_rate = clip.frame_rate;
+  start->foot_range = who.foot_range;
   start->first_body = pose_skeleton(who.avatar, first.person(person));
   for (const SceneState& frame : frames) {
     start->body.push_back(pose_skeleton(who.avatar, frame.person(person)));

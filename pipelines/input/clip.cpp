@@ -13,6 +13,7 @@
 #include "core/size_text.h"
 #include "core/text.h"
 #include "optim/solid/mesh_distance.h"
+#include "optim/standing_feet.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/contacts.h"
@@ -42,6 +43,9 @@ void take_person(const DataSettings& data, SetupPerson& setup, const FrameSource
   person.betas = setup.motion.betas;
   person.gender = setup.motion.gender;
   person.avatar = std::move(setup.avatar);
+  std::vector<std::vector<double>> joints;
+  for (const BodyPose& pose : person.estimate) joints.push_back(pose_joints(person.avatar, pose));
+  if (!joints.empty()) person.foot_range = lower_foot_range(joints);
 }
 
 /// As estimate_of, of the objects.

@@ -44,6 +44,7 @@ struct ClipPerson {
   Avatar avatar;
   std::optional<BodyModel> body;       ///< that the avatar was made on, where a loss asks for it
   std::vector<BodyPose> estimate;      ///< estimated poses by frame; empty: none
+  std::optional<double> foot_range;    ///< of the estimate (lower_foot_range), metres; none without one
   std::optional<Keypoints> keypoints;  ///< of data.keypoints
   std::vector<double> betas;           ///< of the person, as the motion file says; empty: not known
   std::string gender = "neutral";      ///< of the body model, likewise

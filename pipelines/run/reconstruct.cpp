@@ -507,7 +507,7 @@ class Reconstruction {
         run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
     drop_what_is_left(s, result);
     warn_of_terms_off(result.off, name, stage, !clip_.objects.empty());
-    warn_of_idle_terms(result.notes, name);
+    warn_of_idle_terms(result.notes, name, false);
     warn_of_still_joints(clip_, before, states, name);
     folder_.note("all frames, " + stage_text(name, result, begin, clip_));
     return {result.iterations, result.rollbacks, result.seconds};
@@ -567,8 +567,10 @@ class Reconstruction {
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
     // By then all frames before are there that terms over the motion want to see.
-    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst)
+    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst) {
       warn_of_terms_off(result.off, name, stage, !clip_.objects.empty());
+      warn_of_idle_terms(result.notes, name, true);
+    }
     for (const LeftOutObject& object : result.left_out) {
       if (!object.reason.empty() && object.of_human && frame.index <= 1)
         log_warning("stage " + name + ": the loss \"" + object.term + "\" has no effect in frame " +

@@ -166,9 +166,10 @@ std::vector<std::string> GradientWatch::still_groups() const {
   return names;
 }
 
-void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage) {
+void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage, bool of_clip) {
   for (const LossNote& note : notes) {
-    if (note.is_idle) log_warning("stage " + stage + ": the loss \"" + note.term + "\" moves nothing: " + note.text);
+    if (note.is_idle && (note.is_of_clip || !of_clip))
+      log_warning("stage " + stage + ": the loss \"" + note.term + "\" moves nothing: " + note.text);
   }
 }
 

@@ -54,7 +54,8 @@ class GradientWatch {
 };
 
 /// Every term of a stage that moves nothing by what it found: one warning, with that.
-void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage);
+/// @param of_clip  only those that move nothing in any frame
+void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage, bool of_clip);
 
 /// A stage over the sequence that leaves the joints where they were: less than a tenth of a millimetre on average is a
 /// warning, with how far. Its terms then hold each other, or nothing moves.

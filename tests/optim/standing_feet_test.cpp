@@ -24,6 +24,22 @@ struct Joints {
 
 }  // namespace
 
+TEST_CASE("the lower foot's range is that of medians over five frames of the lowest joint of the feet") {
+  std::vector<std::vector<double>> frames(12, Joints().numbers);
+  CHECK(lower_foot_range(frames) == 0);
+  const auto lift = [&frames](std::size_t t, double by, std::initializer_list<const char*> names) {
+    for (const char* name : names) frames[t][static_cast<std::size_t>(3 * smplx_joint(name) + 2)] += by;
+  };
+  for (std::size_t t = 0; t < 12; ++t) lift(t, 0.5, {"left_foot", "left_ankle", "head"});  // the other foot stands
+  CHECK(lower_foot_range(frames) == 0);
+  lift(4, 0.4, {"right_foot", "right_ankle"});
+  lift(5, 0.4, {"right_foot", "right_ankle"});  // two frames are noise
+  CHECK(lower_foot_range(frames) == 0);
+  lift(6, 0.4, {"right_foot", "right_ankle"});
+  CHECK(lower_foot_range(frames) == Approx(0.4));
+  CHECK(lower_foot_range(std::span(frames).first(1)) == 0);
+}
+
 TEST_CASE("sliding is the mean horizontal step of the feet that stand, in a tenth of a second") {
   const Joints first;
   Joints after;

@@ -320,13 +320,36 @@ TEST_CASE("ground is the squared change of the height of the lowest points of th
   const auto lifted = [&](const BodyPoint& p) -> Vector3<double> {
     return test.start.place(p) + Vector3<double>(0.5, 0, p.frame == kStill ? 0.3 : 0);
   };
-  const auto value = [&](const std::string& settings) { return motion_loss("ground", settings, no_joint, lifted); };
-  CHECK(value(R"({"points": 2})") == Approx(0.09 / 3).epsilon(1e-12));
-  CHECK(value(R"({"points": 2, "kernel": "huber", "scale": 0.1})") == Approx((2 * 0.1 * 0.3 - 0.01) / 3).epsilon(1e-6));
-  CHECK(value(R"({"points": 2, "kernel": "geman_mcclure", "scale": 0.1})") ==
-        Approx(0.01 * 0.09 / 0.1 / 3).epsilon(1e-6));
-  CHECK_THROWS_WITH(value(R"({"scale": 0.2})"),
-                    Catch::Contains("/scale: does nothing with kernel \"squared\"; allowed: kernel \"huber\""));
+  CHECK(motion_loss("ground", R"({"points": 2})", no_joint, lifted) == Approx(0.09 / 3).epsilon(1e-12));
+  CHECK(motion_loss("ground", R"({"points": 2, "level_within": 0.3})", no_joint, lifted) > 0);  // nothing is estimated
+}
+
+TEST_CASE("ground is off where the estimate's feet go up and down") {
+  MotionOfTest test;
+  for (const double range : {0.29, 0.31}) {
+    test.start.foot_range = range;
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&test.start, [](const MotionStart*) {});
+    inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+    std::vector<LossNote> notes;
+    inputs.notes = &notes;
+    bool is_asked = false;
+    inputs.body_points = [&](const std::vector<BodyPoint>& points) {
+      is_asked = true;
+      return tape.parameter("feet", shape_of(std::ssize(points), 3));
+    };
+    const Var<double> loss = record_term("ground", inputs, R"({"level_within": 0.3})");
+    CHECK(is_asked == (range < 0.3));
+    CHECK(record_term("ground", inputs, "{}").tape != nullptr);  // by itself it is on
+    tape.forward(loss);
+    tape.backward(loss);
+    if (range < 0.3) continue;
+    CHECK(tape.value(loss).scalar() == 0);
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].text == "the lower foot goes up and down by 0.31 m in the estimated poses");
+    CHECK((notes[0].is_idle && notes[0].is_of_clip));
+  }
 }
 
 TEST_CASE("foot_sliding counts feet that stood when the stage began") {
