@@ -127,6 +127,17 @@ TEST_CASE("a loss that is off is told once, with the reason", "[run]") {
   }
 }
 
+TEST_CASE("a ground that the estimate says is not level is told once", "[run]") {
+  const TemporaryFolder here;
+  here.write("a.json", R"({"extends": ")" + tiny_config_file() +
+                           R"(", "stages": {"interaction": {"losses": {"ground": {"level_within": 1e-6}}}}})");
+  const Warnings warnings;
+  execute_tiny(load_run_config("a.json", {}, descriptions_of(loss_terms())), "run");
+  CHECK(warnings.all().size() == 1);
+  CHECK(warnings.holding("stage interaction: the loss \"ground\" moves nothing: the lower foot goes up and down by ") ==
+        1);
+}
+
 TEST_CASE("an object that center leaves out is told once, with its frames, also by a run that was resumed", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config({"stages.interaction.losses.center.min_opacity=100000"});
