@@ -214,6 +214,35 @@ std::vector<SceneState> states(const Run& run) {
   return all;
 }
 
+py::array_t<double> pairs_of(const std::vector<PlaceSigmas>& frames, std::vector<PlaceSigma> PlaceSigmas::*part,
+                             std::size_t begin, std::size_t end, Sizes shape) {
+  std::vector<double> numbers;
+  for (const PlaceSigmas& frame : frames) {
+    for (std::size_t i = begin; i < end; ++i) {
+      numbers.push_back((frame.*part)[i].across);
+      numbers.push_back((frame.*part)[i].along);
+    }
+  }
+  return array_of(std::move(numbers), std::move(shape));
+}
+
+py::dict sigmas(const Run& run) {
+  std::vector<std::string> names;
+  std::vector<PlaceSigmas> frames;
+  {
+    const Released released;
+    names = object_names(run);
+    frames = read_place_sigmas(run.paths.motion(), run.paths.objects(), names);
+  }
+  py::dict all;
+  if (frames.empty()) return all;
+  const py::ssize_t count = std::ssize(frames), joints = std::ssize(frames[0].joints);
+  all[kHumanMasks] = pairs_of(frames, &PlaceSigmas::joints, 0, frames[0].joints.size(), {count, joints, 2});
+  for (std::size_t o = 0; o < names.size(); ++o)
+    all[py::str(names[o])] = pairs_of(frames, &PlaceSigmas::objects, o, o + 1, {count, 2});
+  return all;
+}
+
 py::array_t<float> frame_image(const Run& run, int frame, const std::string& kind) {
   Image image;
   {
@@ -278,6 +307,12 @@ void add_runs(py::module_& module) {
           "cameras", [](const Run& run) { return read_cameras(run.paths.cameras()); }, "The cameras of all frames.")
       .def_property_readonly("objects", &objects, "The objects' tracks, as read_object_tracks gives them.")
       .def_property_readonly("states", &states, "Camera, objects and bodies of all frames: a list of State.")
+      .def_property_readonly(
+          "sigmas", &sigmas,
+          "How sure the places are that it found: a dict, \"human\" [T,22,2] of the first person's joints, and [T,2] "
+          "of\n"
+          "each object's centroid by name. Metres, one standard deviation across the view and along it; inf: nothing\n"
+          "tells the place, nan: of a frame that was given. Empty unless the config had `uncertainty`.")
       .def("image", &frame_image, py::arg("frame"), py::arg("kind") = "render",
            "[H,W,C] an image of a frame; kinds: target, render, difference, start, side.")
       .def("__repr__", [](const Run& run) { return "<hsi4d.Run " + run.paths.folder.string() + ">"; });

@@ -83,6 +83,20 @@ class Runs(unittest.TestCase):
         self.assertEqual(run.objects, {})
         self.assertEqual([state.objects for state in run.states], [[], [], [], []])
 
+    def test_how_sure_places_are(self):
+        self.assertEqual(self.run_.sigmas, {})
+        self.assertIsNone(hsi4d.read_joint_sigma(self.run_.folder + "/motion.npz"))
+        run = hsi4d.run(config({"uncertainty": True}), scratch() / "run")
+        sigmas = run.sigmas
+        self.assertEqual(list(sigmas), ["human", "watering_can"])
+        self.assertEqual((sigmas["human"].shape, sigmas["watering_can"].shape), ((4, 22, 2), (4, 2)))
+        for name in sigmas:
+            self.assertTrue(np.isnan(sigmas[name][0]).all())  # frame 0 was given
+            self.assertTrue((sigmas[name][1:] > 0).all())
+        np.testing.assert_array_equal(hsi4d.read_joint_sigma(run.folder + "/motion.npz"), sigmas["human"])
+        np.testing.assert_array_equal(np.load(run.folder + "/objects.npz")["watering_can/sigma"],
+                                      sigmas["watering_can"])
+
     def test_no_run(self):
         with self.assertRaisesRegex(hsi4d.UserError, "holds no run"):
             hsi4d.Run(scratch())
