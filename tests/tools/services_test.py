@@ -371,6 +371,9 @@ def test_sora(folder):
                    *more, **{"OPENAI_API_KEY": "key", **environment})
 
     check(sora("sits", OPENAI_API_KEY=""), 2, "OPENAI_API_KEY has to be in the environment")
+    other = folder / "image.jpg"
+    other.write_bytes(b"\xff\xd8\xff\xe0 a photograph")
+    check(sora("sits", "--image", other), 2, "image.jpg: is no PNG file")
     check(sora("sits", "--dry-run"), 0, "POST", '"prompt": "sits"', '"size": "64x48"')
     check(sora("sits", OPENAI_API_KEY="wrong"), 1, "answers 401", "no such key")
     assert not SoraStandIn.forms

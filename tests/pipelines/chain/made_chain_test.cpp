@@ -63,11 +63,12 @@ struct Workshop {
     }
   }
   static RunConfig config() { return changed_config(make_all); }
-  /// A program estimates poses too, and the camera of a clip is chosen. Where a file of the name "hang-poses" is, the
-  /// program hangs for the clip that it names.
+  /// A program estimates poses too, and the camera of a clip is chosen. Where a file of the name "hang-poses" or
+  /// "fail-poses" is, the program hangs or fails for the clip that it names.
   static RunConfig estimating(std::size_t chosen) {
     script("poses",
-           "echo \"$1\" >> poses.txt; if [ \"$(cat hang-poses 2> /dev/null)\" = \"$1\" ]; then sleep 60; fi\n" +
+           "echo \"$1\" >> poses.txt; if [ \"$(cat hang-poses 2> /dev/null)\" = \"$1\" ]; then sleep 60; fi\n"
+           "if [ \"$(cat fail-poses 2> /dev/null)\" = \"$1\" ]; then exit 3; fi\n" +
                std::string("cp ") + (TinyChain::folder() / "clips").string() + "/$1/truth/motion.npz \"$2\"");
     return changed_config([chosen](Json& c) {
       make_all(c);
@@ -253,6 +254,33 @@ TEST_CASE("a chain goes on after a stop while a camera is chosen, and after one 
   CHECK(text_of("film.txt") == "clip1\nclip2\n");  // what was there is not made again
   CHECK(text_of("mask.txt") == "clip1\nclip2\n");
   CHECK(text_of("poses.txt") == "clip1\nclip2\nclip2\n");
+}
+
+TEST_CASE("a chain goes on after any of its programs has failed for any clip", "[run][chain]") {
+  const Workshop workshop;
+  const RunConfig config = Workshop::estimating(1);
+  execute_tiny_chain(config, "run");
+  fs::rename("run", "whole");
+  fs::rename("generated", "generated-whole");
+  for (const char* notes : {"film.txt", "mask.txt", "poses.txt"}) fs::remove(notes);
+  bool is_begun = false;
+  for (const char* clip : {"clip1", "clip2"}) {
+    for (const char* program : {"film", "mask", "poses"}) {
+      INFO(program << " fails for " << clip);
+      const std::string fails = std::string("fail-") + program;
+      std::ofstream(fails) << clip;
+      CHECK_THROWS_WITH(execute_tiny_chain(config, "run", 1, is_begun), Contains("ended with status 3"));
+      is_begun = true;
+      CHECK(json_of("run/status.json")["state"] == "failed");
+      CHECK(finished_clips(config, "run", loss_terms()) == (std::string(clip) == "clip1" ? 0 : 1));
+      fs::remove(fails);
+    }
+  }
+  execute_tiny_chain(config, "run", 1, true);
+  check_same_chains("run", "whole");
+  CHECK(text_of("film.txt") == "clip1\nclip2\n");  // each was made once
+  CHECK(text_of("mask.txt") == "clip1\nclip2\n");
+  CHECK(text_of("poses.txt") == "clip1\nclip1\nclip2\nclip2\n");  // and asked for once more where it failed
 }
 
 TEST_CASE("an input that a clip of a chain names is not made", "[run][chain]") {

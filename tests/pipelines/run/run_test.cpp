@@ -584,6 +584,30 @@ TEST_CASE("the whole demo is as accurate as the project promises", "[full][demo]
   CHECK(number_at(last, "jitter") < number_at(interaction, "jitter"));
 }
 
+TEST_CASE("the paper's schedule finds camera, body and object of a clip, and its refinement does something", "[full]") {
+  const TemporaryFolder here;
+  const std::string clip = (shipped_configs() / "synthetic/clips/terrace_wave_guitar.json").string();
+  REQUIRE(run_hsi4d({"synth", clip, "--quiet", "--set", "synthetic.size_px=256", "--set", "synthetic.frames=12",
+                     "--out", "clip"})
+              .status == 0);
+  here.write("clip/paper.json", nlohmann::json({{"extends", (shipped_configs() / "paper.json").string()},
+                                                {"data", json_of("clip/config.json")["data"]}})
+                                    .dump());
+  const ProgramResult run = run_hsi4d({"run", "clip/paper.json", "--quiet", "--out", "run"});
+  INFO(run.err);
+  INFO(run.out);
+  REQUIRE(run.status == 0);
+  const nlohmann::json summary = json_of("run/summary.json");
+  REQUIRE(summary["metrics"].size() == 3);
+  const nlohmann::json &start = summary["baselines"]["start"], &interaction = summary["metrics"][1],
+                       &last = summary["metrics"][2];
+  CHECK(number_at(last, "camera_translation_cm") <= 1);
+  CHECK(number_at(last, "object_translation_cm") <= 5);
+  CHECK(number_at(last, "mpjpe_mm") <= 0.5 * number_at(start, "mpjpe_mm"));
+  CHECK(number_at(last, "world_mpjpe_mm") <= 1.02 * number_at(interaction, "world_mpjpe_mm"));
+  CHECK(number_at(last, "jitter") <= 0.9 * number_at(interaction, "jitter"));
+}
+
 TEST_CASE("the demo halves the errors of what it is given, and tells them", "[full][demo]") {
   const TemporaryFolder here;
   const ProgramResult demo = run_hsi4d({"demo", "--quick", "--quiet", "--out", "demo"});
