@@ -77,6 +77,35 @@ py::array_t<double> turns_of(const Motion& motion) {
   return array_of(std::move(numbers), {std::ssize(motion.poses), kSmplxJoints, 3});
 }
 
+/// [T,J,2]; None where the file has none.
+py::object joint_sigma_in(const fs::path& path) {
+  std::vector<double> numbers;
+  py::ssize_t frames = 0;
+  {
+    const Released released;
+    numbers = read_joint_sigmas(path.string());
+    if (!numbers.empty()) frames = std::ssize(read_motion(path.string()).poses);
+  }
+  if (numbers.empty()) return py::none();
+  const py::ssize_t joints = std::ssize(numbers) / (2 * frames);
+  return array_of(std::move(numbers), {frames, joints, 2});
+}
+
+void write_motion_with(const fs::path& path, const Motion& motion, const py::object& joint_sigma) {
+  std::vector<double> numbers;
+  if (!joint_sigma.is_none()) {
+    const py::ssize_t frames = std::ssize(motion.poses);
+    numbers = numbers_of<double>(
+                  joint_sigma, {frames, -1, 2}, "joint_sigma",
+                  "[" + std::to_string(frames) + ",J,2], as the motion has " + std::to_string(frames) + " frames")
+                  .values;
+    for (const double number : numbers)
+      if (number < 0) throw UserError("joint_sigma: " + std::to_string(number) + "; allowed: 0 or more, inf, nan");
+  }
+  const Released released;
+  write_motion(path.string(), motion, numbers);
+}
+
 /// Place of an item counted as Python does; IndexError beyond the ends, by which loops end.
 std::size_t place_of(py::ssize_t index, std::size_t size) {
   const auto count = static_cast<py::ssize_t>(size);
@@ -240,8 +269,12 @@ void add_motions(py::module_& module) {
       "read_motion", [](const fs::path& path) { return read_motion_with_warnings(path.string()); }, py::arg("path"),
       WhileReleased(), "A motion (.npz) with the names of AMASS, SMPL-X and other programs (docs/formats.md).");
   module.def(
-      "write_motion", [](const fs::path& path, const Motion& motion) { write_motion(path.string(), motion); },
-      py::arg("path"), py::arg("motion"), WhileReleased(), "Writes a motion (.npz); reading gives the same bits.");
+      "write_motion", &write_motion_with, py::arg("path"), py::arg("motion"), py::arg("joint_sigma") = py::none(),
+      "Writes a motion (.npz); reading gives the same bits. joint_sigma: as read_joint_sigma gives it, to be kept.");
+  module.def("read_joint_sigma", &joint_sigma_in, py::arg("path"),
+             "How sure a motion (.npz) is of the places of its first J joints: [T,J,2] metres, one standard deviation\n"
+             "across the view and along it, inf: nothing tells the place, nan: of a frame that was given. None: the\n"
+             "file does not say it.");
   module.def("read_object_tracks", &read_tracks, py::arg("path"),
              "objects.npz: a dict of names and pairs of rotations [T,3], axis-angle, and translations [T,3], metres.");
   module.def("write_object_tracks", &write_tracks, py::arg("path"), py::arg("tracks"),

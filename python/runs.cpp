@@ -8,7 +8,9 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "pipelines/chain/chain.h"
+#include "pipelines/config/masks.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/record/folder.h"
 #include "pipelines/run/run.h"
@@ -140,25 +142,104 @@ py::list metrics(const Run& run) {
   return lines;
 }
 
+/// The names of the people: as their masks are called, the first one first.
+std::vector<std::string> people_of(const Run& run) {
+  std::vector<std::string> names = {kHumanMasks};
+  const ConfigValue config = parse_json_text(read_text_file(run.paths.config()), run.paths.config());
+  const ConfigValue* const data = find_member(config, "data");
+  const ConfigValue* const people = data == nullptr ? nullptr : find_member(*data, "people");
+  if (people == nullptr) return names;
+  for (const ConfigMember& member : people->members) names.push_back(member.key);
+  return names;
+}
+
+/// Their motions, in the same order.
+std::vector<Motion> read_motions(const Run& run, const std::vector<std::string>& people) {
+  std::vector<Motion> all = {read_motion_with_warnings(run.paths.motion())};
+  for (std::size_t p = 1; p < people.size(); ++p)
+    all.push_back(read_motion_with_warnings(run.paths.motion_of(people[p])));
+  return all;
+}
+
 Motion motion(const Run& run) {
   const Released released;
   return read_motion_with_warnings(run.paths.motion());
 }
 
+py::dict motions(const Run& run) {
+  std::vector<std::string> people;
+  std::vector<Motion> read;
+  {
+    const Released released;
+    people = people_of(run);
+    read = read_motions(run, people);
+  }
+  py::dict all;
+  for (std::size_t p = 0; p < people.size(); ++p) all[py::str(people[p])] = std::move(read[p]);
+  return all;
+}
+
+/// Whether it ended without objects: there is no file of theirs then.
+bool has_no_objects(const Run& run) { return fs::exists(run.paths.motion()) && !fs::exists(run.paths.objects()); }
+
+py::dict objects(const Run& run) { return has_no_objects(run) ? py::dict() : read_tracks(run.paths.objects()); }
+
+std::vector<std::string> object_names(const Run& run) {
+  return has_no_objects(run) ? std::vector<std::string>() : track_names(run.paths.objects());
+}
+
+void check_frames(const std::string& file, std::size_t frames, const std::string& cameras, std::size_t wanted) {
+  if (frames != wanted)
+    throw DataError(file + ": it has " + std::to_string(frames) + " frames, " + cameras + " " + std::to_string(wanted));
+}
+
 std::vector<SceneState> states(const Run& run) {
   const Released released;
-  const Motion bodies = read_motion_with_warnings(run.paths.motion());
+  const std::vector<std::string> people = people_of(run), names = object_names(run);
+  const std::vector<Motion> bodies = read_motions(run, people);
   const std::vector<Camera> cameras = read_cameras(run.paths.cameras());
-  const std::vector<std::string> names = track_names(run.paths.objects());
-  const auto objects = read_object_tracks(run.paths.objects(), names);
-  if (cameras.size() != bodies.poses.size() || (!names.empty() && objects.size() != cameras.size()))
-    throw DataError(run.paths.cameras() + ": " + std::to_string(cameras.size()) + " cameras; " + run.paths.motion() +
-                    " has " + std::to_string(bodies.poses.size()) + " frames, " + run.paths.objects() + " " +
-                    std::to_string(objects.size()));
-  std::vector<SceneState> all;
-  for (std::size_t t = 0; t < cameras.size(); ++t)
-    all.push_back(
-        {cameras[t].camera_from_world, names.empty() ? std::vector<ObjectPose>() : objects[t], bodies.poses[t]});
+  std::vector<SceneState> all(cameras.size());
+  for (std::size_t p = 0; p < people.size(); ++p)
+    check_frames(p == 0 ? run.paths.motion() : run.paths.motion_of(people[p]), bodies[p].poses.size(),
+                 run.paths.cameras(), cameras.size());
+  for (std::size_t t = 0; t < cameras.size(); ++t) {
+    all[t].camera_from_world = cameras[t].camera_from_world;
+    all[t].body = bodies[0].poses[t];
+    for (std::size_t p = 1; p < people.size(); ++p) all[t].others.push_back(bodies[p].poses[t]);
+  }
+  if (names.empty()) return all;
+  auto tracks = read_object_tracks(run.paths.objects(), names);
+  check_frames(run.paths.objects(), tracks.size(), run.paths.cameras(), cameras.size());
+  for (std::size_t t = 0; t < cameras.size(); ++t) all[t].objects = std::move(tracks[t]);
+  return all;
+}
+
+py::array_t<double> pairs_of(const std::vector<PlaceSigmas>& frames, std::vector<PlaceSigma> PlaceSigmas::*part,
+                             std::size_t begin, std::size_t end, Sizes shape) {
+  std::vector<double> numbers;
+  for (const PlaceSigmas& frame : frames) {
+    for (std::size_t i = begin; i < end; ++i) {
+      numbers.push_back((frame.*part)[i].across);
+      numbers.push_back((frame.*part)[i].along);
+    }
+  }
+  return array_of(std::move(numbers), std::move(shape));
+}
+
+py::dict sigmas(const Run& run) {
+  std::vector<std::string> names;
+  std::vector<PlaceSigmas> frames;
+  {
+    const Released released;
+    names = object_names(run);
+    frames = read_place_sigmas(run.paths.motion(), run.paths.objects(), names);
+  }
+  py::dict all;
+  if (frames.empty()) return all;
+  const py::ssize_t count = std::ssize(frames), joints = std::ssize(frames[0].joints);
+  all[kHumanMasks] = pairs_of(frames, &PlaceSigmas::joints, 0, frames[0].joints.size(), {count, joints, 2});
+  for (std::size_t o = 0; o < names.size(); ++o)
+    all[py::str(names[o])] = pairs_of(frames, &PlaceSigmas::objects, o, o + 1, {count, 2});
   return all;
 }
 
@@ -217,13 +298,21 @@ void add_runs(py::module_& module) {
           "status", [](const Run& run) { return json_file(run.paths.status()); }, "status.json, a dict.")
       .def_property_readonly("summary", &summary, "summary.json, a dict: errors by stage and frame.")
       .def_property_readonly("metrics", &metrics, "metrics.jsonl, a list of dicts, one an iteration.")
-      .def_property_readonly("motion", &motion, "The bodies of all frames.")
+      .def_property_readonly("motion", &motion, "The body of the first person in all frames.")
+      .def_property_readonly(
+          "motions", &motions,
+          "The bodies of all people in all frames: a dict of names and Motions. The first person is\n"
+          "\"human\", those beside it are called as in data.people.")
       .def_property_readonly(
           "cameras", [](const Run& run) { return read_cameras(run.paths.cameras()); }, "The cameras of all frames.")
+      .def_property_readonly("objects", &objects, "The objects' tracks, as read_object_tracks gives them.")
+      .def_property_readonly("states", &states, "Camera, objects and bodies of all frames: a list of State.")
       .def_property_readonly(
-          "objects", [](const Run& run) { return read_tracks(run.paths.objects()); },
-          "The objects' tracks, as read_object_tracks gives them.")
-      .def_property_readonly("states", &states, "Camera, objects and body of all frames: a list of State.")
+          "sigmas", &sigmas,
+          "How sure the places are that it found: a dict, \"human\" [T,22,2] of the first person's joints, and [T,2] "
+          "of\n"
+          "each object's centroid by name. Metres, one standard deviation across the view and along it; inf: nothing\n"
+          "tells the place, nan: of a frame that was given. Empty unless the config had `uncertainty`.")
       .def("image", &frame_image, py::arg("frame"), py::arg("kind") = "render",
            "[H,W,C] an image of a frame; kinds: target, render, difference, start, side.")
       .def("__repr__", [](const Run& run) { return "<hsi4d.Run " + run.paths.folder.string() + ">"; });

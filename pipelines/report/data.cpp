@@ -1,14 +1,19 @@
 #include "pipelines/report/data.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 
+#include "body/body_model.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/json_text.h"
+#include "core/npz.h"
 #include "core/progress.h"
 #include "pipelines/draw/plate_mark.h"
+#include "pipelines/input/state.h"
+#include "pipelines/metrics/sigma_metrics.h"
 #include "pipelines/record/folder.h"
 
 namespace hsi4d {
@@ -183,6 +188,52 @@ void read_view_file(const RunPaths& paths, ReportData& data) {
   data.view3d = read_view3d(paths.view3d());
 }
 
+// ---- motion.npz and objects.npz: how sure places are ----
+
+/// The objects of objects.npz that have sigmas.
+std::vector<std::string> objects_with_sigmas(const std::string& path) {
+  constexpr std::string_view kEnding = "/sigma";
+  std::vector<std::string> names;
+  if (!is_file(path)) return names;
+  const Npz file = Npz::read(path);
+  for (const std::string& name : file.names())
+    if (name.ends_with(kEnding)) names.push_back(name.substr(0, name.size() - kEnding.size()));
+  return names;
+}
+
+/// @param sigma_in  of one frame
+template <class F>
+PlaceRow place_row(const std::string& name, bool is_object, const std::vector<PlaceSigmas>& frames, F sigma_in) {
+  PlaceRow row{name, is_object};
+  for (const PlaceSigmas& frame : frames) {
+    const PlaceSigma& sigma = sigma_in(frame);
+    if (std::isnan(sigma.along)) continue;
+    const bool is_sure = sigma.across < kUnsure && sigma.along < kUnsure;
+    ++(is_sure ? row.sure : row.unsure);
+    row.across += is_sure ? sigma.across : 0;
+    row.along += is_sure ? sigma.along : 0;
+  }
+  const double count = std::max<double>(1, static_cast<double>(row.sure));
+  row.across /= count;
+  row.along /= count;
+  return row;
+}
+
+void read_sigmas(const RunPaths& paths, ReportData& data) {
+  if (!is_file(paths.motion())) return;
+  const std::vector<std::string> objects = objects_with_sigmas(paths.objects());
+  const std::vector<PlaceSigmas> frames = read_place_sigmas(paths.motion(), paths.objects(), objects);
+  if (frames.empty()) return;
+  const auto add = [&](const std::string& name, bool is_object, auto sigma_in) {
+    const PlaceRow row = place_row(name, is_object, frames, sigma_in);
+    if (row.sure + row.unsure > 0) data.places.push_back(row);
+  };
+  for (std::size_t o = 0; o < objects.size(); ++o)
+    add(objects[o], true, [o](const PlaceSigmas& frame) { return frame.objects[o]; });
+  for (std::size_t j = 0; j < frames[0].joints.size(); ++j)
+    add(smplx_joint_names()[j], false, [j](const PlaceSigmas& frame) { return frame.joints[j]; });
+}
+
 fs::path whole_path(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
   return whole.has_filename() ? whole : whole.parent_path();
@@ -220,6 +271,7 @@ ReportData read_report_data(const std::string& run_folder) {
   read_metrics_file(paths, data);
   data.frames = read_frame_images(paths.frames(), data.notes);
   read_view_file(paths, data);
+  read_sigmas(paths, data);
   return data;
 }
 

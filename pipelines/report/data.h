@@ -30,6 +30,14 @@ struct StageCurves {
   std::vector<LossCurve> curves;  ///< a frame each, in order
 };
 
+/// How sure a joint or an object is: means over the frames at which it is surer than kUnsure, metres.
+struct PlaceRow {
+  std::string name;
+  bool is_object = false;
+  double across = 0, along = 0;  ///< PlaceSigma
+  Index sure = 0, unsure = 0;    ///< frames, without those at which nobody looked
+};
+
 /// A run folder, as far as it is there.
 struct ReportData {
   std::string name;                                        ///< of the run, or of its folder
@@ -42,6 +50,7 @@ struct ReportData {
   std::vector<StageCurves> stages;  ///< in the order of their first line
   std::vector<FrameImages> frames;
   View3d view3d;
+  std::vector<PlaceRow> places;    ///< objects, then joints; empty: the run does not say how sure they are
   std::vector<std::string> notes;  ///< what is missing or odd
 };
 

@@ -274,6 +274,30 @@ std::string frame_errors_section(const RunSummary& summary) {
          "<div class=\"plots\">\n" + cards + "</div>\n</section>\n";
 }
 
+// ---- How sure places are ----
+
+/// By object and joint; empty where the run does not say it.
+std::string places_section(const std::vector<PlaceRow>& places) {
+  if (places.empty()) return "";
+  const bool has_unsure = std::any_of(places.begin(), places.end(), [](const PlaceRow& row) { return row.unsure > 0; });
+  Table table{.head = {"place", "across the view", "along it"}, .align = "lr"};
+  if (has_unsure) table.head.emplace_back("unsure");
+  for (const PlaceRow& row : places) {
+    const auto millimetres = [&row](double metres) { return row.sure == 0 ? kNoCell : Cell(1e3 * metres, 1); };
+    std::vector<Cell> cells = {row.name, millimetres(row.across), millimetres(row.along)};
+    cells[0].html = row_label(row.name);
+    if (has_unsure) cells.emplace_back(std::to_string(row.unsure) + " of " + std::to_string(row.sure + row.unsure));
+    table.rows.push_back(std::move(cells));
+  }
+  std::string text = "<section id=\"places\">\n<h2>How sure places are</h2>\n<div class=\"card wide\">" +
+                     table_html(table, "errors") +
+                     "</div>\n<p class=\"caption\">The claimed sigma, one standard deviation in millimetres along an "
+                     "axis of the image and along the camera's: means over the frames, of the objects' centroids and "
+                     "of the joints.";
+  if (has_unsure) text += " Frames at which it is 1 m or more are counted as unsure, and left out of the means.";
+  return text + "</p>\n</section>\n";
+}
+
 // ---- Losses ----
 
 constexpr size_t kMostBuckets = 80;
@@ -487,6 +511,7 @@ std::string report_page(const ReportData& data) {
   page += frames_section(data);
   page += view3d_section(data);
   if (data.summary) page += frame_errors_section(*data.summary);
+  page += places_section(data.places);
   if (data.summary) page += published_section(*data.summary);
   page += losses_section(data);
   page += shares_section(data);

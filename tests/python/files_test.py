@@ -141,6 +141,21 @@ class Bodies(unittest.TestCase):
         with self.assertRaises(IndexError):
             read[4]
 
+    def test_how_sure_a_motion_is(self):
+        file = scratch() / "m.npz"
+        motion = hsi4d.Motion(np.zeros((4, 3)), np.zeros((4, 55, 3)))
+        hsi4d.write_motion(file, motion)
+        self.assertIsNone(hsi4d.read_joint_sigma(file))
+        sigma = np.random.default_rng(7).uniform(0, 1, (4, 22, 2))
+        sigma[0], sigma[1, 3] = np.nan, np.inf
+        hsi4d.write_motion(file, motion, joint_sigma=sigma)
+        np.testing.assert_array_equal(hsi4d.read_joint_sigma(file), sigma)
+        np.testing.assert_array_equal(np.load(file)["joint_sigma"], sigma)
+        np.testing.assert_array_equal(hsi4d.read_motion(file).transl, motion.transl)
+        for wrong, text in [(sigma[:3], r"allowed: \[4,J,2\]"), (sigma[..., :1], "joint_sigma"), (-sigma, "allowed: 0 or more")]:
+            with self.assertRaisesRegex(hsi4d.UserError, text):
+                hsi4d.write_motion(file, motion, wrong)
+
     def test_tracks(self):
         folder = scratch()
         random = np.random.default_rng(6)

@@ -23,7 +23,7 @@ class Page(unittest.TestCase):
             program(*commands[0].split(), "--set", "synthetic.size_px=96", "--set", "synthetic.frames=4")
             names = {}
             blocks = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-            self.assertEqual(len(blocks), 9)
+            self.assertEqual(len(blocks), 10)
             for block in blocks:
                 exec(compile(block, "docs/python.md", "exec"), names)
         finally:
@@ -32,6 +32,20 @@ class Page(unittest.TestCase):
         self.assertLess(names["losses"][-1], names["losses"][0])
         self.assertEqual(names["vertices"].shape[1], 3)
         self.assertTrue(np.all(np.isfinite(names["picture"])))
+        self.check_autograd(names)
+
+    def check_autograd(self, names):
+        """The page's automatic differentiation: its term has a gradient of its own, and a wrong rule in it is found."""
+        stage, variable = names["camera_stage"], names["Variable"]
+        stage.evaluate()
+        self.assertGreater(stage.terms["charbonnier"], 0)
+        self.assertEqual(stage.weights["charbonnier"], 1)
+        image = np.array([0.5, -2, 3])
+        value, adjoints = names["charbonnier"](image, np.zeros(3))
+        self.assertAlmostEqual(value, np.sqrt(image**2 + 1e-4).mean())
+        np.testing.assert_allclose(adjoints["rendered"], image / np.sqrt(image**2 + 1e-4) / 3)
+        variable.mean = lambda self: variable(self.value.mean(), (self, lambda d: np.full_like(self.value, d)))
+        self.assertFalse(stage.check_gradients()["ok"])
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import json
 import logging
 import os
+import shutil
 import signal
 import threading
 import time
@@ -11,7 +12,7 @@ import unittest
 import numpy as np
 
 import hsi4d
-from support import config, dataset, program, scratch
+from support import SOURCE, config, dataset, program, scratch
 
 
 class Configs(unittest.TestCase):
@@ -74,6 +75,28 @@ class Runs(unittest.TestCase):
         image = hsi4d.render([hsi4d.read_gaussians(data / "scene.ply"), avatar.pose(state.body)], camera, blur=0.13)
         self.assertLess(np.abs(np.clip(image, 0, 1) - run.image(2)).mean(), 0.05)  # the object is missing
 
+    def test_without_objects(self):
+        settings = json.loads(dataset().read_text())
+        settings["data"]["objects"] = {}
+        settings["stages"] = {"camera": settings["stages"]["camera"]}
+        run = hsi4d.run(hsi4d.make_config(settings, dataset().parent), scratch() / "run")
+        self.assertEqual(run.objects, {})
+        self.assertEqual([state.objects for state in run.states], [[], [], [], []])
+
+    def test_how_sure_places_are(self):
+        self.assertEqual(self.run_.sigmas, {})
+        self.assertIsNone(hsi4d.read_joint_sigma(self.run_.folder + "/motion.npz"))
+        run = hsi4d.run(config({"uncertainty": True}), scratch() / "run")
+        sigmas = run.sigmas
+        self.assertEqual(list(sigmas), ["human", "watering_can"])
+        self.assertEqual((sigmas["human"].shape, sigmas["watering_can"].shape), ((4, 22, 2), (4, 2)))
+        for name in sigmas:
+            self.assertTrue(np.isnan(sigmas[name][0]).all())  # frame 0 was given
+            self.assertTrue((sigmas[name][1:] > 0).all())
+        np.testing.assert_array_equal(hsi4d.read_joint_sigma(run.folder + "/motion.npz"), sigmas["human"])
+        np.testing.assert_array_equal(np.load(run.folder + "/objects.npz")["watering_can/sigma"],
+                                      sigmas["watering_can"])
+
     def test_no_run(self):
         with self.assertRaisesRegex(hsi4d.UserError, "holds no run"):
             hsi4d.Run(scratch())
@@ -81,6 +104,52 @@ class Runs(unittest.TestCase):
             hsi4d.run(config(), scratch() / "run", threads=-1)
         with self.assertRaisesRegex(hsi4d.UserError, "holds a run"):
             hsi4d.run(config(), self.run_.folder)
+
+
+class SeveralPeople(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        """The shipped clip of two people, as small as it goes."""
+        folder = scratch()
+        program("synth", SOURCE / "configs/synthetic/two_people.json", "--out", folder / "data",
+                "--set", "synthetic.frames=3", "--set", "synthetic.size_px=64", "--set", "synthetic.video=png",
+                "--set", "synthetic.scene_gaussians=1500", "--set", "synthetic.avatar_gaussians=500")
+        settings = json.loads((folder / "data" / "config.json").read_text())
+        cls.config = hsi4d.load_config(
+            folder / "data" / "config.json", {f"stages.{name}.iterations": 2 for name in settings["stages"]})
+        cls.run_ = hsi4d.run(cls.config, folder / "run")
+
+    def test_all_are_in_motions_and_states(self):
+        run = self.run_
+        self.assertEqual(list(run.motions), ["human", "friend"])
+        np.testing.assert_array_equal(run.motions["human"].transl, run.motion.transl)
+        self.assertEqual(len(run.states), 3)
+        for t, state in enumerate(run.states):
+            self.assertEqual(len(state.others), 1)
+            np.testing.assert_array_equal(state.body.transl, run.motion.transl[t])
+            np.testing.assert_array_equal(state.others[0].rotations, run.motions["friend"].rotations[t])
+        self.assertGreater(np.abs(run.motions["friend"].transl - run.motion.transl).max(), 0.1)
+
+    def test_a_stage_goes_on_from_its_states(self):
+        run = self.run_
+        stage = hsi4d.Stage(self.config, "interaction", frame=2, before=run.states[:2], start=run.states[2])
+        np.testing.assert_array_equal(stage.state.others[0].transl, run.motions["friend"].transl[2])
+        stage.step()
+        self.assertTrue(np.isfinite(stage.evaluate()[0]))
+        stage = hsi4d.Stage(self.config, "refinement", before=run.states)
+        self.assertEqual([len(state.others) for state in stage.states], [1, 1, 1])
+        np.testing.assert_array_equal(stage.states[1].others[0].transl, run.motions["friend"].transl[1])
+        alone = [hsi4d.State(state.camera_from_world, state.body, state.objects) for state in run.states]
+        with self.assertRaises(hsi4d.UserError):
+            hsi4d.Stage(self.config, "refinement", before=alone)
+
+    def test_a_motion_that_is_of_another_length(self):
+        folder = scratch() / "copy"
+        shutil.copytree(self.run_.folder, folder)
+        motion = self.run_.motions["friend"]
+        hsi4d.write_motion(folder / "motion_of_friend.npz", hsi4d.Motion(motion.transl[:2], motion.rotations[:2]))
+        with self.assertRaisesRegex(hsi4d.DataError, "motion_of_friend.npz: it has 2 frames, .*cameras.json 3"):
+            hsi4d.Run(folder).states
 
 
 class Stops(unittest.TestCase):

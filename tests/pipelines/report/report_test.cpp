@@ -8,9 +8,11 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "body/motion_io.h"
 #include "core/check.h"
 #include "core/compression.h"
 #include "core/image_io.h"
+#include "pipelines/input/state.h"
 #include "pipelines/record/folder.h"
 #include "pipelines/report/figure.h"
 #include "pipelines/report/view3d.h"
@@ -473,6 +475,47 @@ TEST_CASE("how sure a run says that it is is shaded under its errors") {
   const std::string depth = text_between(page, "world, in depth by frame", "</svg>");
   const std::string line = text_between(depth, "<polyline points=\"", "\"");
   CHECK_THAT(text_between(depth, "<polygon points=\"", "\""), Contains(line));
+}
+
+TEST_CASE("how sure joints and objects are is a table where the run says it") {
+  const TemporaryFolder here;
+  make_run("a", "first");
+  CHECK_FALSE(ids_of(report_html("a")).contains("places"));
+  // Three frames, the first of which was given. The wrist is known in one of the others.
+  constexpr std::size_t kPelvis = 0, kWrist = 20, kUnknownJoint = 21;
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  std::vector<PlaceSigmas> sigmas = {no_sigmas(1), no_sigmas(1), no_sigmas(1)};
+  sigmas[1].joints[kPelvis] = {0.002, 0.010};
+  sigmas[2].joints[kPelvis] = {0.004, 0.030};
+  sigmas[1].joints[kWrist] = {0.0125, 0.05};
+  sigmas[2].joints[kWrist] = {0.5, 1.5};
+  sigmas[1].joints[kUnknownJoint] = sigmas[2].joints[kUnknownJoint] = {kInfinite, kInfinite};
+  sigmas[1].objects[0] = {0.001, 0.0200};
+  sigmas[2].objects[0] = {0.003, 0.0206};
+  const Motion motion{.poses = {3, rest_pose(55)}};
+  const RunPaths paths{"a"};
+  write_motion(paths.motion(), motion, joint_sigmas_of(sigmas));
+  const SceneState state{{}, {ObjectPose()}, rest_pose(55)};
+  write_object_tracks(paths.objects(), {"red_cup"}, {state, state, state}, sigmas);
+  const std::string page = report_html("a");
+  CHECK(tag_fault(page) == "");
+  const std::string section = text_between(page, "<section id=\"places\">", "</section>");
+  CHECK_THAT(section, Contains("<th>place</th><th>across the view</th><th>along it</th><th>unsure</th></tr>"));
+  const std::string rows = text_between(section, "<tbody>\n", "</tbody>");
+  const std::string expected =
+      "<tr><th scope=\"row\">red cup</th><td>2.0</td><td>20.3</td><td>0 of 2</td></tr>\n"
+      "<tr><th scope=\"row\">pelvis</th><td>3.0</td><td>20.0</td><td>0 of 2</td></tr>\n"
+      "<tr><th scope=\"row\">left wrist</th><td>12.5</td><td>50.0</td><td>1 of 2</td></tr>\n"
+      "<tr><th scope=\"row\">right wrist</th><td class=\"none\">–</td><td class=\"none\">–</td><td>2 of 2</td></tr>\n";
+  CHECK(rows == expected);  // and none of the joints at which nobody looked
+  // Without an object, and without what is unsure.
+  fs::remove(paths.objects());
+  sigmas[2].joints[kWrist] = {0.0125, 0.05};
+  sigmas[1].joints[kUnknownJoint] = sigmas[2].joints[kUnknownJoint] = {0.1, 0.2};
+  write_motion(paths.motion(), motion, joint_sigmas_of(sigmas));
+  const std::string surer = text_between(report_html("a"), "<section id=\"places\">", "</section>");
+  CHECK(surer.find("unsure") == std::string::npos);
+  CHECK(count_of(surer, "<tr>") == 4);
 }
 
 TEST_CASE("many iterations keep their smallest and largest losses") {
