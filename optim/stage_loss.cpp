@@ -25,16 +25,46 @@ std::any prepared_of(const LossSettings& chosen, const LossTerm& term) {
   return prepared_loss(term.description.prepare, chosen.own.has_value() ? chosen.own : term.description.defaults);
 }
 
+/// Notes of a term of several people: it is idle only where it is so for all, and each tells whose it is.
+/// @param by_person  how many notes there were before each of them, and after the last
+void name_people(const std::vector<std::size_t>& by_person, std::vector<LossNote>& notes) {
+  const auto of_all = [&](bool LossNote::*flag) {
+    for (std::size_t p = 0; p + 1 < by_person.size(); ++p) {
+      const auto first = notes.begin() + static_cast<std::ptrdiff_t>(by_person[p]),
+                 last = notes.begin() + static_cast<std::ptrdiff_t>(by_person[p + 1]);
+      if (std::none_of(first, last, [flag](const LossNote& note) { return note.*flag; })) return false;
+    }
+    return true;
+  };
+  const bool is_idle = of_all(&LossNote::is_idle), is_of_clip = of_all(&LossNote::is_of_clip);
+  for (std::size_t p = 0; p + 1 < by_person.size(); ++p) {
+    for (std::size_t i = by_person[p]; i < by_person[p + 1]; ++i) {
+      notes[i].is_idle = notes[i].is_idle && is_idle;
+      notes[i].is_of_clip = notes[i].is_of_clip && is_of_clip;
+      notes[i].text = "person " + std::to_string(p + 1) + ": " + notes[i].text;
+    }
+  }
+}
+
 /// The term of the first person and all else, and of each other person.
 template <class S>
 Var<S> record_term(const LossTerm& term, const LossInputs<S>& inputs, const std::any& prepared) {
+  std::vector<std::size_t> notes;
+  const auto count_notes = [&] {
+    if (inputs.notes != nullptr) notes.push_back(inputs.notes->size());
+  };
+  count_notes();
   Var<S> sum = term.record(inputs, prepared);
+  count_notes();
   if (!term.description.needs) return sum;  // of images
   for (LossInputs<S> other : inputs.others) {
     other.left_out = inputs.left_out;
+    other.notes = inputs.notes;
     const Var<S> value = term.record(other, prepared);
     if (value.tape != nullptr) sum = sum.tape == nullptr ? value : sum + value;
+    count_notes();
   }
+  if (inputs.notes != nullptr && !inputs.others.empty()) name_people(notes, *inputs.notes);
   return sum;
 }
 

@@ -37,7 +37,8 @@ std::optional<double> foot_sliding_mm(std::span<const double> before, std::span<
                                       std::span<const double> first, double frame_rate);
 
 /// How far the lower foot goes up and down: the range over the frames of the height of the lowest of ankles and balls
-/// of the feet, each a median of up to five frames around it, metres. On level ground it is the noise of the poses.
+/// of the feet, each the median of the frames around it, up to two before and after, metres. On level ground it is the
+/// noise of the poses.
 /// @param joints  [frame][J,3] in the order of SMPL-X, metres, world (z up); one frame at least
 double lower_foot_range(std::span<const std::vector<double>> joints);
 

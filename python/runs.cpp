@@ -142,14 +142,24 @@ py::list metrics(const Run& run) {
   return lines;
 }
 
+ConfigValue config_of(const Run& run) {
+  return parse_json_text(read_text_file(run.paths.config()), run.paths.config());
+}
+
+/// The keys of a section of `data`; none where there is none.
+std::vector<std::string> names_in_data(const ConfigValue& holder, const char* section) {
+  const ConfigValue* const data = find_member(holder, "data");
+  const ConfigValue* const found = data == nullptr ? nullptr : find_member(*data, section);
+  std::vector<std::string> names;
+  if (found == nullptr) return names;
+  for (const ConfigMember& member : found->members) names.push_back(member.key);
+  return names;
+}
+
 /// The names of the people: as their masks are called, the first one first.
 std::vector<std::string> people_of(const Run& run) {
-  std::vector<std::string> names = {kHumanMasks};
-  const ConfigValue config = parse_json_text(read_text_file(run.paths.config()), run.paths.config());
-  const ConfigValue* const data = find_member(config, "data");
-  const ConfigValue* const people = data == nullptr ? nullptr : find_member(*data, "people");
-  if (people == nullptr) return names;
-  for (const ConfigMember& member : people->members) names.push_back(member.key);
+  std::vector<std::string> names = names_in_data(config_of(run), "people");
+  names.insert(names.begin(), kHumanMasks);
   return names;
 }
 
@@ -179,8 +189,13 @@ py::dict motions(const Run& run) {
   return all;
 }
 
-/// Whether it ended without objects: there is no file of theirs then.
-bool has_no_objects(const Run& run) { return fs::exists(run.paths.motion()) && !fs::exists(run.paths.objects()); }
+/// Whether nothing but people moves in it: then there is no file of objects.
+bool has_no_objects(const Run& run) {
+  const ConfigValue config = config_of(run);
+  if (!names_in_data(config, "objects").empty()) return false;
+  const ConfigValue* const chain = find_member(config, "chain");  // whose clips all have the same objects
+  return chain == nullptr || chain->items.empty() || names_in_data(chain->items.front(), "objects").empty();
+}
 
 py::dict objects(const Run& run) { return has_no_objects(run) ? py::dict() : read_tracks(run.paths.objects()); }
 
@@ -309,9 +324,9 @@ void add_runs(py::module_& module) {
       .def_property_readonly("states", &states, "Camera, objects and bodies of all frames: a list of State.")
       .def_property_readonly(
           "sigmas", &sigmas,
-          "How sure the places are that it found: a dict, \"human\" [T,22,2] of the first person's joints, and [T,2] "
-          "of\n"
-          "each object's centroid by name. Metres, one standard deviation across the view and along it; inf: nothing\n"
+          "How sure the places are that it found: a dict, \"human\" [T,22,2] of the first person's joints, and [T,2]\n"
+          "of each object's centroid by name. Metres, one standard deviation across the view and along it; inf: "
+          "nothing\n"
           "tells the place, nan: of a frame that was given. Empty unless the config had `uncertainty`.")
       .def("image", &frame_image, py::arg("frame"), py::arg("kind") = "render",
            "[H,W,C] an image of a frame; kinds: target, render, difference, start, side.")

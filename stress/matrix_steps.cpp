@@ -1,7 +1,8 @@
 // Rows G about steps by a Gauss-Newton matrix (lm): matrices without full rank, losses that bend down, bad evaluations.
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <vector>
 
 #include <Eigen/LU>
 
@@ -100,14 +101,17 @@ std::vector<StressFigure> bad_matrix_steps(Remedy remedy) {
     Tape<double> tape;
     const Var<double> number = leaf(tape, "x", shape_of(1, 1), {x});
     const MatrixEnd end = end_of_lm(tape, number, sum(number * 2.0 - log(number)), 0.4);
-    x = end.x.front(), bad = static_cast<double>(end.bad);
+    x = end.x.front();
+    bad = static_cast<double>(end.bad);
   } else {
     for (Index i = 0; i < kMatrixSteps; ++i) {
       if (!std::isfinite(std::log(x))) ++bad;
       x -= kLongestMatrixStep * 0.4 * (2 - 1 / x) / std::abs(2 - 1 / x);  // as far as a step goes
     }
   }
-  return {{"off the least value", std::abs(x - 0.5), 0.02}, {"bad evaluations", bad, 10}};
+  return {{"off the least value", std::abs(x - 0.5), 0.02},
+          {"bad evaluations", bad, 10},
+          {"of which there is one", bad > 0 ? 0.0 : 1.0, 0}};
 }
 
 }  // namespace hsi4d::stress

@@ -2,9 +2,9 @@
 // the `points` Gaussians of the feet that were lowest in frame t when the stage began, z̄_0 that of the first frame.
 //
 // From one view depth is the least certain direction, and a body that is a little too far away also seems to float.
-// For clips in which a foot is always down, on level ground. With `level_within` L is 0 where the clip's estimate has
-// the lower foot go up and down further than that: who climbs would be held down, as a square is stronger than what a
-// picture of a small person says.   [beyond the paper: method.md, §8]
+// For clips in which a foot is always down, on level ground. With `level_within` L is 0 in all frames where the clip's
+// estimate has the lower foot go up and down further than that: who climbs would be held down, as a square is stronger
+// than what a picture of a small person says.   [beyond the paper: method.md, §8]
 #include <algorithm>
 
 #include "autodiff/elementwise.h"
@@ -31,12 +31,13 @@ void describe(ConfigFields& fields, GroundSettings& settings) {
 }
 
 /// Whether the estimate says that the ground is not level.
-bool is_left(const MotionStart& motion, const GroundSettings& settings) {
+bool is_not_level(const MotionStart& motion, const GroundSettings& settings) {
   return settings.level_within > 0 && motion.foot_range.value_or(0) > settings.level_within;
 }
 
-std::string not_level_text(const MotionStart& motion) {
-  return "the lower foot goes up and down by " + rounded(*motion.foot_range, 2) + " m in the estimated poses";
+std::string not_level_text(const MotionStart& motion, const GroundSettings& settings) {
+  return "the lower foot goes up and down by " + rounded(*motion.foot_range, 2) +
+         " m in the estimated poses, and level_within is " + rounded(settings.level_within, 2) + " m";
 }
 
 /// The lowest of the rows in a frame, and their mean height.
@@ -69,8 +70,9 @@ LossTerm ground_loss() {
                        const MotionStart& motion = *in.motion;
                        const std::vector<Index> feet = rows_of_joints(motion.avatar->weights, is_foot_joint);
                        if (feet.empty()) return Value{};
-                       if (is_left(motion, settings)) {
-                         if (in.notes != nullptr) in.notes->push_back({"ground", not_level_text(motion), true, true});
+                       if (is_not_level(motion, settings)) {
+                         if (in.notes != nullptr)
+                           in.notes->push_back({"ground", not_level_text(motion, settings), true, true});
                          return sum(in.joints) * 0.0;  // depends on what the term does, and moves nothing
                        }
                        const Index count = std::min(settings.points, std::ssize(feet));

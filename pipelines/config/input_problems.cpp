@@ -154,7 +154,7 @@ struct KnownInputs {
   bool video = false, masks = false;  ///< a program outside makes them
   bool camera = false;                ///< it is chosen
   bool state = false;                 ///< frame 0 is that in which another clip ended
-  std::filesystem::path folder = {};  ///< that of an instance, which is not there; empty: none
+  std::filesystem::path folder = {};  ///< of an instance, where it is none; empty: there is one
 };
 
 /// @param in  the section, "/data"
@@ -177,7 +177,7 @@ void add_missing_problems(const DataSettings& data, const std::string& in, const
     std::vector<std::string> keys;
     for (const Input& input : inputs) keys.emplace_back(input.key);
     const std::string looked =
-        known.folder.empty() ? "" : ", and /instance/folder is not there (" + known.folder.string() + ")";
+        known.folder.empty() ? "" : ", and /instance/folder is no folder (" + known.folder.string() + ")";
     found.push_back({in,
                      "no inputs are given" + looked + "; a run needs " + joined(keys) +
                          ". `hsi4d synth` makes a dataset with a config beside it to run; `hsi4d demo` makes one and "
@@ -326,7 +326,7 @@ void add_input_problems(const RunConfig& config, ConfigUse use, std::vector<RunP
   }
 }
 
-void add_input_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+void add_given_input_problems(const DataSettings& data, std::vector<RunProblem>& found) {
   add_name_problems(data, "/data", found);
   add_missing_problems(data, "/data", {}, found);
 }

@@ -12,6 +12,6 @@ namespace hsi4d {
 void add_input_problems(const RunConfig& config, ConfigUse use, std::vector<RunProblem>& found);
 
 /// Names that collide and what is missing, where nothing makes inputs.
-void add_input_problems(const DataSettings& data, std::vector<RunProblem>& found);
+void add_given_input_problems(const DataSettings& data, std::vector<RunProblem>& found);
 
 }  // namespace hsi4d

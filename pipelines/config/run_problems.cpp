@@ -257,7 +257,7 @@ void prepare_run(RunConfig& config) {
 
 void check_inputs(const DataSettings& data) {
   std::vector<RunProblem> found;
-  add_input_problems(data, found);
+  add_given_input_problems(data, found);
   throw_if_any(found);
 }
 

@@ -36,7 +36,7 @@ std::vector<const SceneState*> HiddenTracker::frames_with(std::size_t object, In
 }
 
 void HiddenTracker::start_hidden(Index index, const ClipFrame& frame, const std::vector<SceneState>& done,
-                                 const ColorState& colors, SceneState& state) const {
+                                 const ColorState& colors, SceneState& state) {
   seen_.push_back(seen_shares(clip_, frame, config_.data.mask_threshold, state));
   for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
     if (!is_hidden(index - 1, o) && !is_hidden(index, o)) continue;

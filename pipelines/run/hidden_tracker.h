@@ -23,7 +23,8 @@ class HiddenTracker {
     int pass = 1;
   };
 
-  /// @param seen  [frame][object] the share that a frame shows, of the frames that have begun; kept by reference
+  /// @param seen  [frame][object] the share that a frame shows, of the frames that have begun; start_hidden appends to
+  /// it
   /// @param note  told what was done with an object, for the log
   HiddenTracker(const RunConfig& config, const Clip& clip, std::vector<std::vector<double>>& seen,
                 std::function<void(const std::string&)> note);
@@ -37,7 +38,7 @@ class HiddenTracker {
   /// that it shows again.
   /// @param done  states of the frames before
   void start_hidden(Index index, const ClipFrame& frame, const std::vector<SceneState>& done, const ColorState& colors,
-                    SceneState& state) const;
+                    SceneState& state);
 
   /// Whatever stages made of objects that the frame hides, these go with their carriers.
   /// @param known  states by frame: those before, or, of a later pass, of all as the stages before it left them

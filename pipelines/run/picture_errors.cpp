@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "pipelines/graph/frame_masks.h"
+#include "pipelines/draw/frame_images.h"
 #include "pipelines/metrics/background_errors.h"
 #include "pipelines/metrics/sequence_errors.h"
 

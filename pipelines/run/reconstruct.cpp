@@ -18,11 +18,9 @@
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
-#include "pipelines/graph/frame_masks.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/input_hashes.h"
-#include "pipelines/metrics/background_errors.h"
 #include "pipelines/metrics/sequence_errors.h"
 #include "pipelines/record/results.h"
 #include "pipelines/record/run_events.h"
@@ -678,7 +676,7 @@ class Reconstruction {
   TrackPoints tracks_;                       // of the frames that are done, in this pass
   PlaceSigmas sigmas_;                       // of the frame at hand
   std::optional<std::size_t> surest_stage_;  // which tells them
-  const HiddenTracker hidden_;
+  HiddenTracker hidden_;
   const ColorState start_colors_;
   Progress bar_;
   std::vector<ProgressPart> terms_;  // of the iteration at hand

@@ -22,7 +22,7 @@ std::string loss_text(double loss, std::span<const LossValue> terms);
 /// @param begin  loss_text of the first iteration
 std::string stage_text(const std::string& stage, const StageResult& result, const std::string& begin, const Clip& clip);
 
-/// What metrics.jsonl keeps of an iteration.
+/// What metrics.jsonl keeps of an iteration. It refers to the report.
 /// @param frame     none: all at once
 /// @param counters  null: nothing was drawn
 IterationRecord iteration_record(std::optional<Index> frame, const std::string& stage, const IterationReport& report,

@@ -152,7 +152,8 @@ class Bodies(unittest.TestCase):
         np.testing.assert_array_equal(hsi4d.read_joint_sigma(file), sigma)
         np.testing.assert_array_equal(np.load(file)["joint_sigma"], sigma)
         np.testing.assert_array_equal(hsi4d.read_motion(file).transl, motion.transl)
-        for wrong, text in [(sigma[:3], r"allowed: \[4,J,2\]"), (sigma[..., :1], "joint_sigma"), (-sigma, "allowed: 0 or more")]:
+        for wrong, text in [(sigma[:3], r"allowed: \[4,J,2\]"), (sigma[..., :1], "joint_sigma"),
+                            (-sigma, "allowed: 0 or more")]:
             with self.assertRaisesRegex(hsi4d.UserError, text):
                 hsi4d.write_motion(file, motion, wrong)
 

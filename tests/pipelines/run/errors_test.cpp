@@ -91,7 +91,7 @@ TEST_CASE("inputs that are not given are all told before anything is written", "
              R"({"extends": "tiny.json", "instance": {"scene": "Room", "type": "indoor", "source": "made",
     "object": "static", "prompt": "A person sits.", "folder": "nowhere"}})");
   CHECK_THAT(run_hsi4d({"run", "instance.json", "--out", "run"}).err,
-             Contains("/data: no inputs are given, and /instance/folder is not there (" +
+             Contains("/data: no inputs are given, and /instance/folder is no folder (" +
                       (here.path() / "nowhere").string() + "); a run"));
   CHECK(run_hsi4d({"run", tiny_config_file(), "--out", "run", "--set", "data.masks=", "--set", "data.frames="}).err ==
         "2 problems:\n"
