@@ -38,6 +38,7 @@ TEST_CASE("the lower foot's range is that of medians over five frames of the low
   lift(6, 0.4, {"right_foot", "right_ankle"});
   CHECK(lower_foot_range(frames) == Approx(0.4));
   CHECK(lower_foot_range(std::span(frames).first(1)) == 0);
+  CHECK(lower_foot_range(std::span(frames).subspan(5)) == Approx(0.4));  // the first of them has two after it alone
 }
 
 TEST_CASE("sliding is the mean horizontal step of the feet that stand, in a tenth of a second") {
