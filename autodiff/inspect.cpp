@@ -39,6 +39,7 @@ std::string TapeInspector<S>::array_name(ArrayId id) const {
 template <class S>
 void TapeInspector<S>::forward(NodeId n) {
   const FlushDenormals flush;
+  tape_.nodes_[n].ran_at = 0;  // inputs may have been changed where the tape does not see it
   tape_.forward_node(tape_.nodes_[n]);
 }
 

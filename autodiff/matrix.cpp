@@ -112,35 +112,40 @@ template <class S>
 struct ConcatOp {
   static constexpr const char* kName = "concat";
   static constexpr bool kAssigns = true;
+  static constexpr bool kPersistentOutputs = true;  // parts that are as they were are not copied again
   bool along_rows;
 
-  /// Calls f(part, row, col, begin, end) for rows [begin, end) of a part that lies at (row, col) of the output.
-  template <class F>
-  void for_rows(const NodeIo<S>& io, const F& f) const {
+  /// Calls f(part, row of it, row and column of the output, numbers) for all that lies together in both, of parts for
+  /// which `counts`: a row, or the rows of a chunk.
+  template <class Counts, class F>
+  void for_runs(const NodeIo<S>& io, const Counts& counts, const F& f) const {
     Index row = 0, col = 0;
     for (int i = 0; i < io.inputs(); ++i) {
       const Shape& part = io.in(i).shape;
-      parallel_for(part.rows, kMovedNumbers / std::max<Index>(1, part.cols) + 1,
-                   [&](Index begin, Index end) { f(i, row, col, begin, end); });
+      if (counts(i)) {
+        parallel_for(part.rows, kMovedNumbers / std::max<Index>(1, part.cols) + 1, [&](Index begin, Index end) {
+          if (along_rows && part.dense()) return f(i, begin, row + begin, col, (end - begin) * part.cols);
+          for (Index r = begin; r < end; ++r) f(i, r, row + r, col, part.cols);
+        });
+      }
       (along_rows ? row : col) += along_rows ? part.rows : part.cols;
     }
   }
   void forward(NodeIo<S>& io) {
-    for_rows(io, [&io](int i, Index row, Index col, Index begin, Index end) {
-      const ConstArray<S> x = io.in(i);
-      const Array<S> y = io.out();
-      for (Index r = begin; r < end; ++r) std::copy_n(x.row(r), x.shape.cols, y.row(row + r) + col);
+    const auto counts = [&io](int i) { return io.is_changed(i); };
+    for_runs(io, counts, [&io](int i, Index r, Index row, Index col, Index numbers) {
+      std::copy_n(io.in(i).row(r), numbers, io.out().row(row) + col);
     });
   }
   void backward(NodeIo<S>& io) {
-    for_rows(io, [&io](int i, Index row, Index col, Index begin, Index end) {
-      if (!io.wants(i)) return;
-      const Array<S> d_x = io.d_in(i);
-      const ConstArray<S> d_y = io.d_out();
-      io.begin_rows(i, begin, end);
-      for (Index r = begin; r < end; ++r) {
-        const S* from = d_y.row(row + r) + col;
-        for (Index c = 0; c < d_x.shape.cols; ++c) d_x.row(r)[c] += from[c];
+    const auto counts = [&io](int i) { return io.wants(i); };
+    for_runs(io, counts, [&io](int i, Index r, Index row, Index col, Index numbers) {
+      const S* const from = io.d_out().row(row) + col;
+      S* const to = io.d_in(i).row(r);
+      if (io.must_assign(i)) {
+        std::copy_n(from, numbers, to);
+      } else {
+        for (Index k = 0; k < numbers; ++k) to[k] += from[k];
       }
     });
   }
@@ -156,14 +161,17 @@ struct ConcatOp {
     }
     if (per_row == 0) return;
     Twists<S>& all = movers.of_output(io, 0, io.out().shape.rows, per_row, dims);
-    for_rows(io, [&](int i, Index row, Index, Index begin, Index end) {
+    Index row = 0;
+    for (int i = 0; i < io.inputs(); row += io.in(i++).shape.rows) {
       const Twists<S>* const part = movers.of_input(io, i);
-      if (part == nullptr) return;
-      for (Index r = begin; r < end; ++r) {
-        std::copy_n(&part->movers[r * part->per_row], part->per_row, &all.mover(row + r, 0));
-        std::copy_n(part->rate(r, 0), part->per_row * dims * kTwist, all.rate(row + r, 0));
-      }
-    });
+      if (part == nullptr) continue;
+      parallel_for(io.in(i).shape.rows, kMovedNumbers / (per_row * dims * kTwist) + 1, [&](Index begin, Index end) {
+        for (Index r = begin; r < end; ++r) {
+          std::copy_n(&part->movers[r * part->per_row], part->per_row, &all.mover(row + r, 0));
+          std::copy_n(part->rate(r, 0), part->per_row * dims * kTwist, all.rate(row + r, 0));
+        }
+      });
+    }
   }
 };
 
