@@ -29,6 +29,7 @@ enum class LossInput {
   kUnknowns,       ///< unknowns: in a stage over the first frame that moves some
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points
+  kSigmas,         ///< joints_sigma, view_axes: in a stage over the sequence that a run makes
   kObjectMotion,   ///< object_points, and motion with objects
   kContacts,       ///< motion->contacts, with body_points and object_points: where data.contacts is given
   kBodyVertices,   ///< motion->mesh, where the avatar was made on it; on demand

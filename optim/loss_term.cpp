@@ -27,6 +27,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(body_rotations);
     case LossInput::kMotion:
       return given(joints) && motion;
+    case LossInput::kSigmas:
+      return given(joints_sigma) && given(view_axes);
     case LossInput::kObjectMotion:
       return object_points && motion && !motion->objects.empty();
     case LossInput::kContacts:

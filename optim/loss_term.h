@@ -79,6 +79,12 @@ struct LossInputs {
                           ///< frames that move
   Var<S> joints;          ///< [F,66] places of joints 0 to 21, metres, world, a frame a row
   Var<S> joints_start;    ///< [F,66] what they were when the stage began
+  Var<S> joints_after;  ///< [A,66] what they are in the A frames that follow, up to three; a stage of one frame that is
+                        ///< gone through again knows them, else none is given
+  Var<S> joints_sigma;  ///< [F,44] how sure they are, of each joint one standard deviation across the view and one
+                        ///< along it, metres; +∞: nothing tells, not a number: nobody looked; only for terms that
+                        ///< need kSigmas, as the next one
+  Var<S> view_axes;     ///< [F,3] the cameras' z in the world, of length 1
   std::shared_ptr<const MotionStart> motion;  ///< what was where when the stage began; null: not given
   /// Record places of some points of the human, all of one set, and of some of the objects' Gaussians, [P,3] metres,
   /// world, in frames that move.

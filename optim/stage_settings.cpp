@@ -48,6 +48,7 @@ const char* words_of(LossInput need) {
       return "a look that is learnt";
     case LossInput::kPose:
     case LossInput::kMotion:
+    case LossInput::kSigmas:
     case LossInput::kObjectMotion:
     case LossInput::kContacts:
     case LossInput::kBodyVertices:

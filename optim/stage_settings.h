@@ -111,8 +111,9 @@ std::vector<LossFault> prepare_losses(StageSettings& stage);
 
 /// What losses can read in a stage that draws the scene alone, and in one over the sequence.
 inline constexpr std::array<LossInput, 1> kImageInputs = {LossInput::kImage};
-inline constexpr std::array<LossInput, 5> kMotionInputs = {
-    LossInput::kPose, LossInput::kMotion, LossInput::kObjectMotion, LossInput::kContacts, LossInput::kBodyVertices};
+inline constexpr std::array<LossInput, 6> kMotionInputs = {LossInput::kPose,     LossInput::kMotion,
+                                                           LossInput::kSigmas,   LossInput::kObjectMotion,
+                                                           LossInput::kContacts, LossInput::kBodyVertices};
 
 /// Losses that are on and need what the stage does not have.
 ///

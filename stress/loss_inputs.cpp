@@ -160,6 +160,7 @@ LossLeaves<S> loss_leaves(Tape<S>& tape) {
   in.body_rotations = leaf("body_rotations", shape_of(21, 9), some_pose());
   in.joints = leaf("joints", shape_of(kLossFrames, 66), -1, 1);
   in.joints_start = leaf("joints_start", shape_of(kLossFrames, 66), -1, 1);
+  in.joints_after = leaf("joints_after", shape_of(2, 66), -1, 1);
   static const StillLife still_life;
   in.motion = std::shared_ptr<const MotionStart>(&still_life.start, [](const MotionStart*) {});
   constexpr Index kMoving = kLossFrames - kLossStill;

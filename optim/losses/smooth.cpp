@@ -40,9 +40,13 @@ LossTerm smooth_loss() {
           "smooth", "How far joints go between adjacent frames", [](const auto& in, const SmoothSettings& settings) {
             // Differences between frames that stand say nothing.
             const Index first = std::max<Index>(0, in.motion->still_frames - settings.order);
-            const Index frames = in.joints.shape().rows - first;
-            if (frames <= settings.order) return decltype(in.joints){};
-            auto steps = slice_rows(in.joints, first, frames);
+            auto steps = slice_rows(in.joints, first, in.joints.shape().rows - first);
+            if (in.given(in.joints_after)) {
+              const Index after = std::min<Index>(settings.order, in.joints_after.shape().rows);
+              const std::array parts = {steps, slice_rows(in.joints_after, 0, after)};
+              steps = concat_rows(std::span(parts.begin(), parts.end()));
+            }
+            if (steps.shape().rows <= settings.order) return decltype(in.joints){};
             for (int k = 0; k < settings.order; ++k) {
               const Index rows = steps.shape().rows - 1;
               steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);

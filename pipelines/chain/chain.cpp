@@ -181,6 +181,7 @@ bool is_done(const RunConfig& clip, const std::string& folder, const std::vector
   if (!says_done(clip, folder, losses)) return false;
   RunConfig prepared = clip;
   prepare_run(prepared);
+  prepared = with_passes(prepared);
   prepared.data = made_inputs(prepared);
   const Clip inputs = read_run_clip(prepared, losses);
   return finished_frames(folder, prepared, inputs, losses) + 1 == inputs.frames();  // not without a checkpoint

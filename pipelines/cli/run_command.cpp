@@ -60,7 +60,7 @@ std::string folder_plan(const RunConfig& config, const std::string& identity, co
 std::string stages_text(const RunConfig& config) {
   std::string text;
   bool is_again = false;
-  for (const auto& [name, stage] : config.stages) {
+  for (const auto& [name, stage] : with_passes(config).stages) {
     text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") +
             (stage.over == StageScope::kFirst   ? " over the first frame\n"
              : stage.over == StageScope::kFrame ? (is_again ? " a frame, again\n" : " a frame\n")
@@ -100,12 +100,13 @@ std::string plan_without_clip(const RunConfig& config, const std::string& identi
 /// What a run would do; reads its inputs and its folder, so that what is wrong with them shows.
 std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, const std::string& folder, bool resume) {
   RunConfig config = asked;
-  const std::string identity = resolved_config(config, descriptions_of(losses)), sources = sources_plan(config);
+  const std::string identity = resolved_config(with_passes(config), descriptions_of(losses)),
+                    sources = sources_plan(config);
   if (!sources.empty()) return plan_without_clip(config, identity, folder, resume, sources);
   const Clip clip = read_run_clip(config, losses);
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
   check_run_clip(config, clip);
-  std::string text = folder_plan(config, identity, losses, clip, folder, resume);
+  std::string text = folder_plan(with_passes(config), identity, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
           std::to_string(clip.camera.height) + ", scene of " + count_text(clip.scene.count(), "Gaussian") +
           ", human of " + std::to_string(clip.avatar.count()) + "\n";

@@ -105,6 +105,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
   f.object("approx", s.approx, "What may be computed nearly, and faster");
   f.object("log", s.log, "What is noted for other programs; results do not depend on it");
+  f.object("passes", s.passes, "How often the stages go through the frames");
   f.map("stages", s.stages,
         "The stages of the run by name, in the order in which they run; those over the first frame run first",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });

@@ -18,6 +18,7 @@
 #include "pipelines/config/instance_settings.h"
 #include "pipelines/config/log_settings.h"
 #include "pipelines/config/masks.h"
+#include "pipelines/config/passes.h"
 #include "pipelines/config/source_settings.h"
 #include "pipelines/config/start_settings.h"
 #include "pipelines/config/synthetic_settings.h"
@@ -93,6 +94,7 @@ struct RunConfig {
   SkipSettings skip;
   ApproxSettings approx;
   LogSettings log;
+  PassSettings passes;              ///< see with_passes
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 

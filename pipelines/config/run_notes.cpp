@@ -127,6 +127,8 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   add_hint_notes(config, notes);
   if (config.log.images_every > 0 && !config.log.tensorboard)
     notes.push_back({LogLevel::kWarning, "log.images_every does nothing without log.tensorboard"});
+  if (are_passes_idle(config))
+    notes.push_back({LogLevel::kWarning, "passes.count does nothing: no stage over the sequence lies between passes"});
   const auto inform = [&notes](const char* text) { notes.push_back({LogLevel::kInfo, text}); };
   const RenderSkips& render = config.skip.render;
   if (!render.static_tiles && render.static_layer) inform("skip.static_tiles=false switches skip.static_layer off too");

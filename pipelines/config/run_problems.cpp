@@ -201,20 +201,56 @@ void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& 
   }
 }
 
+bool moves_all_by_pixels(const StageSettings& stage) {
+  constexpr std::array<LossInput, 3> kPixels = {LossInput::kImage, LossInput::kHumanOpacity, LossInput::kObjectOpacity};
+  return stage.draw == Draw::kAll && std::any_of(stage.losses.begin(), stage.losses.end(), [&](const auto& entry) {
+           return std::any_of(kPixels.begin(), kPixels.end(),
+                              [&](LossInput input) { return needs_input(entry.second, input); });
+         });
+}
+
 }  // namespace
 
-std::optional<std::size_t> stage_of_sigmas(const RunConfig& config) {
-  constexpr std::array<LossInput, 3> kPixels = {LossInput::kImage, LossInput::kHumanOpacity, LossInput::kObjectOpacity};
+bool needs_sigmas(const RunConfig& config) {
+  return config.uncertainty || std::any_of(config.stages.begin(), config.stages.end(), [](const auto& stage) {
+           const auto weighs = [](const auto& loss) { return needs_input(loss.second, LossInput::kSigmas); };
+           return std::any_of(stage.second.losses.begin(), stage.second.losses.end(), weighs);
+         });
+}
+
+std::vector<std::size_t> stages_of_sigmas(const RunConfig& config) {
+  std::vector<std::size_t> all;
+  bool is_pass_told = false;  // by a stage that follows
   for (std::size_t s = config.stages.size(); s-- > 0;) {
     const StageSettings& stage = config.stages[s].second;
-    if (stage.over != StageScope::kFrame || stage.draw != Draw::kAll) continue;
-    for (const auto& [name, loss] : stage.losses) {
-      if (std::any_of(kPixels.begin(), kPixels.end(), [&](LossInput input) { return needs_input(loss, input); }))
-        return s;
+    if (stage.over == StageScope::kSequence) is_pass_told = false;
+    if (is_pass_told || stage.over != StageScope::kFrame || !moves_all_by_pixels(stage)) continue;
+    all.push_back(s);
+    is_pass_told = true;
+  }
+  return all;
+}
+
+namespace {
+
+/// Settings that ask how sure places are where no stage tells it.
+void add_sigma_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  if (config.stages.empty() || !stages_of_sigmas(config).empty()) return;
+  const auto refuse = [&found](const std::string& setting) {
+    found.push_back({setting,
+                     "no stage over frames moves human and objects and compares images or masks; allowed: false",
+                     {setting, "/stages"}});
+  };
+  if (config.uncertainty) refuse("/uncertainty");
+  for (const auto& [name, stage] : config.stages) {
+    for (const auto& [term, loss] : stage.losses) {
+      if (needs_input(loss, LossInput::kSigmas))
+        refuse(child_pointer(child_pointer("/stages", name) + "/losses", term) + "/by_sigma");
     }
   }
-  return std::nullopt;
 }
+
+}  // namespace
 
 std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   std::vector<RunProblem> found;
@@ -230,10 +266,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_start_problems(config, found);
   add_unknown_problems(config, found);
   add_given_frame_problems(config, found);
-  if (config.uncertainty && !config.stages.empty() && !stage_of_sigmas(config))
-    found.push_back({"/uncertainty",
-                     "no stage over frames moves human and objects and compares images or masks; allowed: false",
-                     {"/uncertainty", "/stages"}});
+  add_sigma_problems(config, found);
   add_input_problems(config, use, found);
   return found;
 }

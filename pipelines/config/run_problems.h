@@ -11,9 +11,11 @@
 
 namespace hsi4d {
 
-/// The stage whose end tells how sure places are: the last over frames that moves what moves and compares pixels; none
-/// where there is no such stage.
-std::optional<std::size_t> stage_of_sigmas(const RunConfig& config);
+/// Whether a run looks how sure places are: it is asked to tell it, or a loss weighs by it.
+bool needs_sigmas(const RunConfig& config);
+
+/// The stages whose ends tell how sure places are: of each pass the last that moves what moves and compares pixels.
+std::vector<std::size_t> stages_of_sigmas(const RunConfig& config);
 
 /// A problem and the place of the setting that it is about.
 struct RunProblem {

@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "optim/metrics.h"
 #include "pipelines/draw/tape_image.h"
 #include "pipelines/graph/camera_increment.h"
 #include "pipelines/graph/motion_inputs.h"
@@ -432,6 +433,18 @@ void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<Scene
     const Human& human = humans_[p];
     hsi4d::give_motion(MovingFrames<S>{human.rotations, human.skeleton, objects, human.rest_offsets}, clip_, p, first,
                        frames, index, inputs_of(p));
+  }
+}
+
+template <class S>
+void FrameGraph<S>::give_motion_after(std::span<const SceneState> frames) {
+  for (std::size_t p = 0; p < humans_.size(); ++p) {
+    std::vector<double> rows;
+    for (const SceneState& state : frames) {
+      const std::vector<double> joints = pose_skeleton(clip_.person(p).avatar, state.person(p)).joints;
+      rows.insert(rows.end(), joints.begin(), joints.begin() + 3 * kMetricJoints);
+    }
+    inputs_of(p).joints_after = constant_rows(tape_, "joints_after", rows, 3 * kMetricJoints);
   }
 }
 

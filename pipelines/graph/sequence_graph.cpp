@@ -9,6 +9,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "optim/metrics.h"
 
 namespace hsi4d {
 
@@ -76,6 +77,27 @@ SequenceGraph<S>::SequenceGraph(Tape<S>& tape, const Clip& clip, const std::vect
   }
   for (const ParameterGroup<S>& group : groups_) {
     for (const Var<S> block : group.blocks) tape_.freeze(block);
+  }
+}
+
+template <class S>
+void SequenceGraph<S>::give_sigmas(const std::vector<SceneState>& states, const std::vector<PlaceSigmas>& sigmas) {
+  HSI4D_CHECK_EQ(states.size(), sigmas.size());
+  std::vector<double> axes;
+  for (const SceneState& state : states) {
+    const Vector3<double> axis = state.camera_from_world.rotation.row(2);
+    axes.insert(axes.end(), axis.data(), axis.data() + 3);
+  }
+  const Var<S> view_axes = constant_rows(tape_, "view_axes", axes, 3);
+  for (std::size_t p = 0; p < humans_.size(); ++p) {
+    std::vector<double> numbers;
+    for (const PlaceSigmas& frame : sigmas) {
+      for (const PlaceSigma& joint : p == 0 ? frame.joints : frame.others.at(p - 1))
+        numbers.insert(numbers.end(), {joint.across, joint.along});
+    }
+    LossInputs<S>& inputs = p == 0 ? inputs_ : inputs_.others[p - 1];
+    inputs.joints_sigma = constant_rows(tape_, "joints_sigma", numbers, 2 * kMetricJoints);
+    inputs.view_axes = view_axes;
   }
 }
 

@@ -32,6 +32,10 @@ class SequenceGraph {
   SequenceGraph(Tape<S>& tape, const Clip& clip, const std::vector<SceneState>& states, const PosePrior* prior,
                 RotationParameters rotations);
 
+  /// Tells how sure the places of joints are, for terms that need kSigmas. Once.
+  /// @param states, sigmas  by frame
+  void give_sigmas(const std::vector<SceneState>& states, const std::vector<PlaceSigmas>& sigmas);
+
   const LossInputs<S>& loss_inputs() const { return inputs_; }
   /// Everything that may move, all of it frozen.
   const std::vector<ParameterGroup<S>>& groups() const { return groups_; }

@@ -45,10 +45,10 @@ ObjectPose pose_of(const Rigid<double>& world_from_object) {
   return {so3_log(world_from_object.rotation), world_from_object.translation};
 }
 
-PlaceSigmas no_sigmas(std::size_t objects) {
+PlaceSigmas no_sigmas(std::size_t objects, std::size_t others) {
   constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
-  return {std::vector<PlaceSigma>(static_cast<std::size_t>(kMetricJoints), {kNotANumber, kNotANumber}),
-          std::vector<PlaceSigma>(objects, {kNotANumber, kNotANumber})};
+  const std::vector<PlaceSigma> joints(static_cast<std::size_t>(kMetricJoints), {kNotANumber, kNotANumber});
+  return {joints, std::vector<PlaceSigma>(objects, {kNotANumber, kNotANumber}), std::vector(others, joints)};
 }
 
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,

@@ -44,14 +44,16 @@ struct PlaceSigma {
 
 /// How sure the places of a frame are.
 struct PlaceSigmas {
-  std::vector<PlaceSigma> joints;   ///< of the first kMetricJoints (optim/metrics.h)
-  std::vector<PlaceSigma> objects;  ///< of their centroids, in the clip's order
+  std::vector<PlaceSigma> joints;                    ///< of the first kMetricJoints (optim/metrics.h)
+  std::vector<PlaceSigma> objects;                   ///< of their centroids, in the clip's order
+  std::vector<std::vector<PlaceSigma>> others = {};  ///< joints of the people beside the first, in the clip's order
 
   bool operator==(const PlaceSigmas&) const = default;
 };
 
 /// Of a frame that nobody looked at.
-PlaceSigmas no_sigmas(std::size_t objects);
+/// @param others  people beside the first
+PlaceSigmas no_sigmas(std::size_t objects, std::size_t others = 0);
 
 /// How far an object has moved on its joint, by frame (pipelines/input/object_joint.h).
 struct JointTrack {

@@ -370,29 +370,31 @@ ClipUnknowns stored_unknowns(const Checkpoint& checkpoint, const Clip& clip) {
   return {numbers[0], numbers[1], numbers[2], scales, betas};
 }
 
-/// By frame, joints before objects: across, along.
+/// Calls f(place) of all places of a frame: joints, objects, joints of others.
+template <class Sigmas, class F>
+void for_places(Sigmas& frame, const F& f) {
+  std::for_each(frame.joints.begin(), frame.joints.end(), f);
+  std::for_each(frame.objects.begin(), frame.objects.end(), f);
+  for (auto& other : frame.others) std::for_each(other.begin(), other.end(), f);
+}
+
+/// By frame and place: across, along.
 void store_sigmas(const std::vector<PlaceSigmas>& sigmas, Checkpoint& checkpoint) {
   std::vector<double> numbers;
-  for (const PlaceSigmas& frame : sigmas) {
-    for (const auto* places : {&frame.joints, &frame.objects}) {
-      for (const PlaceSigma& place : *places) numbers.insert(numbers.end(), {place.across, place.along});
-    }
-  }
+  for (const PlaceSigmas& frame : sigmas)
+    for_places(frame, [&](const PlaceSigma& place) { numbers.insert(numbers.end(), {place.across, place.along}); });
   checkpoint.set("sigmas", std::move(numbers));
 }
 
 std::vector<PlaceSigmas> stored_sigmas(const Checkpoint& checkpoint, const Clip& clip, std::size_t frames) {
   if (!checkpoint.has("sigmas")) return {};
-  std::vector<PlaceSigmas> sigmas(frames, no_sigmas(clip.objects.size()));
+  std::vector<PlaceSigmas> sigmas(frames, no_sigmas(clip.objects.size(), clip.others.size()));
   const std::vector<double>& numbers = checkpoint.doubles("sigmas");
   expect_size(checkpoint, "sigmas", numbers.size(),
-              frames * 2 * (static_cast<std::size_t>(kMetricJoints) + clip.objects.size()));
+              frames * 2 * (clip.people() * static_cast<std::size_t>(kMetricJoints) + clip.objects.size()));
   const double* next = numbers.data();
-  for (PlaceSigmas& frame : sigmas) {
-    for (auto* places : {&frame.joints, &frame.objects}) {
-      for (PlaceSigma& place : *places) place = {next[0], next[1]}, next += 2;
-    }
-  }
+  for (PlaceSigmas& frame : sigmas)
+    for_places(frame, [&next](PlaceSigma& place) { place = {next[0], next[1]}, next += 2; });
   return sigmas;
 }
 

@@ -72,7 +72,7 @@ struct RunProgress {
   std::vector<StillGroup> still;                     ///< likewise
   std::vector<LeftRange> left_ranges;                ///< likewise
   StartTotals start;                                 ///< where the best start was chosen
-  std::vector<PlaceSigmas> sigmas;                   ///< [frame]; none unless the config asks for it
+  std::vector<PlaceSigmas> sigmas;                   ///< [frame]; none unless a run needs them
   ColorState colors;                                 ///< after the last frame done
   ClipUnknowns unknowns;                             ///< what stages over the first frame found of the clip
   std::vector<std::vector<double>> seen;  ///< [frame][object] the share that is; none unless start.objects is best

@@ -125,10 +125,9 @@ class Estimate {
     tape_.backward(total_);
     const Information information(steps_.transpose() * curvature.compute() * steps_);
     PlaceSigmas sigmas;
-    const Var<S> joints = inputs_.joints;
-    tape_.forward(joints);
-    for (Index j = 0; j < kMetricJoints; ++j)
-      sigmas.joints.push_back(sigma(information, joints, joints.shape().rows - 1, 3 * j, camera_from_world));
+    sigmas.joints = joint_sigmas(information, inputs_.joints, camera_from_world);
+    for (const LossInputs<S>& other : inputs_.others)
+      sigmas.others.push_back(joint_sigmas(information, other.joints, camera_from_world));
     for (const Var<S> place : objects) {
       tape_.forward(place);
       sigmas.objects.push_back(sigma(information, place, 0, 0, camera_from_world));
@@ -245,6 +244,16 @@ class Estimate {
       }
     }
     return jacobian;
+  }
+
+  /// Of the frame at hand, the last row.
+  std::vector<PlaceSigma> joint_sigmas(const Information& information, Var<S> joints,
+                                       const Matrix3<double>& camera_from_world) {
+    std::vector<PlaceSigma> sigmas;
+    tape_.forward(joints);
+    for (Index j = 0; j < kMetricJoints; ++j)
+      sigmas.push_back(sigma(information, joints, joints.shape().rows - 1, 3 * j, camera_from_world));
+    return sigmas;
   }
 
   PlaceSigma sigma(const Information& information, Var<S> places, Index row, Index col,

@@ -120,8 +120,8 @@ class Reconstruction {
         first_stages_(order_.first),
         frame_stages_(order_.frames),
         progress_(first_progress(clip_, frame_stages_, first_nets(config, clip))),
-        sigmas_(no_sigmas(clip.objects.size())),
-        surest_stage_(config.uncertainty ? stage_of_sigmas(config) : std::nullopt),
+        sigmas_(no_sigmas(clip.objects.size(), clip.others.size())),
+        sigma_stages_(needs_sigmas(config) ? stages_of_sigmas(config) : std::vector<std::size_t>{}),
         hidden_(config, clip, progress_.seen, [&folder](const std::string& text) { folder.note(text); }),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
@@ -144,7 +144,8 @@ class Reconstruction {
     warn_of_left_ranges(progress_.left_ranges, config_);
     warn_of_lost(progress_.object_ious, clip_);
     warn_of_what_is_out_of_view(clip_, result());
-    write_results(folder_.paths(), config_, clip_, result(), progress_.colors, progress_.sigmas);
+    write_results(folder_.paths(), config_, clip_, result(), progress_.colors,
+                  config_.uncertainty ? progress_.sigmas : std::vector<PlaceSigmas>{});
     if (!progress_.unknowns.betas.empty()) write_found_avatar();
     RunSummary summary = summarize_run(config_, clip_, progress_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
@@ -211,7 +212,7 @@ class Reconstruction {
       warn_of_other_isa(progress_.isa);
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
-      if (config_.uncertainty && first_stages_ == 0) progress_.sigmas = {sigmas_};
+      if (!sigma_stages_.empty() && first_stages_ == 0) progress_.sigmas = {sigmas_};
       if (hidden_.is_on() && first_stages_ == 0) progress_.seen = {hidden_.all_seen()};
       const ClipFrame frame = read_frame(clip_, 0);
       warn_of_other_first_frame(render_state(config_, clip_, clip_.first, start_colors_), frame.target);
@@ -363,7 +364,7 @@ class Reconstruction {
     write_result(index, frame, after.back(), progress_.colors, progress_.image_errors);
     if (hsi4d::moves_colors(config_)) write_color_nets(index, 1);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
-    if (config_.uncertainty) progress_.sigmas.push_back(sigmas_);
+    if (!sigma_stages_.empty()) progress_.sigmas.push_back(sigmas_);
     progress_.seconds += seconds_since(begin);
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
     if (events_) events_->end_frame(index);
@@ -448,19 +449,20 @@ class Reconstruction {
     for (std::size_t t = 1; t < done.size(); ++t) give_bias(done[t]);
     std::vector<SceneState> biased = states_before(l);
     for (std::size_t t = 1; t < biased.size(); ++t) give_bias(biased[t]);
+    const std::span<const SceneState> after = std::span(biased).subspan(static_cast<std::size_t>(index) + 1);
     SceneState state = biased[static_cast<std::size_t>(index)];
     progress_.colors.nets = colors_after(index).nets;
     if (hidden_.is_on()) hidden_.look_for_lost({index, pass_}, frame, biased, done.back(), progress_.colors, state);
     for (std::size_t i = l; i < end; ++i) {
-      run_in_frame(later_stage() + i, {index, frame, progress_.covered, done}, state, progress_.colors,
+      run_in_frame(later_stage() + i, {index, frame, progress_.covered, done, after}, state, progress_.colors,
                    progress_.later[i].totals);
       hidden_.carry_hidden(index, biased, state);
       progress_.later[i].states.push_back(state);
     }
     if (progress_.bias) hsi4d::remove_depth_bias(clip_, *progress_.bias, progress_.later[end - 1].states.back());
     if (moves_colors(l, end)) write_color_nets(index, pass_);
-    const std::size_t surest = surest_stage_.value_or(0);
-    if (later_stage() + l <= surest && surest < later_stage() + end)
+    const auto is_of_pass = [&](std::size_t s) { return later_stage() + l <= s && s < later_stage() + end; };
+    if (std::any_of(sigma_stages_.begin(), sigma_stages_.end(), is_of_pass))
       progress_.sigmas[static_cast<std::size_t>(index)] = sigmas_;
     progress_.seconds += seconds_since(begin);
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
@@ -501,8 +503,8 @@ class Reconstruction {
       note(std::nullopt, s, report, nullptr, nullptr);
     };
     const std::vector<SceneState> before = states;
-    const StageResult result =
-        run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
+    const StageResult result = run_sequence_stage(
+        {config_, clip_, losses_, s, observer_.stages, nullptr, nullptr, &progress_.sigmas}, states, note_iteration);
     drop_what_is_left(s, result);
     warn_of_terms_off(result.off, name, stage, !clip_.objects.empty());
     warn_of_idle_terms(result.notes, name, false);
@@ -555,10 +557,11 @@ class Reconstruction {
       note(frame.index, s, report, &counters, &totals);
     };
     const SceneState before = state;
-    const bool is_asked = s == surest_stage_ && frame.index > 0;
-    const StageResult result =
-        run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found, is_asked ? &sigmas_ : nullptr},
-                        frame, state, colors, note_iteration);
+    const bool is_asked =
+        frame.index > 0 && std::find(sigma_stages_.begin(), sigma_stages_.end(), s) != sigma_stages_.end();
+    const StageResult result = run_frame_stage(
+        {config_, clip_, losses_, s, observer_.stages, &tracks_, found, nullptr, is_asked ? &sigmas_ : nullptr}, frame,
+        state, colors, note_iteration);
     drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
@@ -673,9 +676,9 @@ class Reconstruction {
   int pass_ = 1;         // through the frames, the one at hand
   int colors_pass_ = 1;  // the last whole one that moved the color net
   RunProgress progress_;
-  TrackPoints tracks_;                       // of the frames that are done, in this pass
-  PlaceSigmas sigmas_;                       // of the frame at hand
-  std::optional<std::size_t> surest_stage_;  // which tells them
+  TrackPoints tracks_;                     // of the frames that are done, in this pass
+  PlaceSigmas sigmas_;                     // of the frame at hand
+  std::vector<std::size_t> sigma_stages_;  // which tell them
   HiddenTracker hidden_;
   const ColorState start_colors_;
   Progress bar_;

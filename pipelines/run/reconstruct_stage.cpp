@@ -173,6 +173,8 @@ RecordedFrame<S> record_frame(Tape<S>& tape, const StageTask& task, const FrameT
   if (stage.draw == Draw::kAll) {
     const std::vector<SceneState> seen = seen_frames(frame.done, state);
     graph.give_motion(first_state(task, frame), seen, frame.index + 1 - std::ssize(seen));
+    const std::size_t after = std::min<std::size_t>(kFramesBefore, frame.after.size());
+    if (after > 0) graph.give_motion_after(frame.after.first(after));
   }
   give_tracks(graph, task, frame);
   const Image weight = pixel_weights(stage, frame, task.config);
@@ -237,7 +239,9 @@ SequenceGraph<S> record_sequence(Tape<S>& tape, const StageTask& task, const std
   tape.set_skips(task.config.skip.tape);
   const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
   const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
-  return SequenceGraph<S>(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
+  SequenceGraph<S> graph(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
+  if (task.known != nullptr && !task.known->empty()) graph.give_sigmas(states, *task.known);
+  return graph;
 }
 
 namespace {

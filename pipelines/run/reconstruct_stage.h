@@ -30,7 +30,8 @@ struct StageTask {
   const StageWatch* watch = nullptr;    ///< null: nobody wants to know where time goes
   TrackPoints* tracks = nullptr;        ///< what was found of them in the run so far; null: found anew
   ClipUnknowns* found = nullptr;        ///< where to put what a stage of a frame finds of the clip; null: nowhere
-  PlaceSigmas* sigmas = nullptr;        ///< where to put how sure it is of places in the end; null: nobody asks
+  const std::vector<PlaceSigmas>* known = nullptr;  ///< how sure places are, by frame; null: nobody asked
+  PlaceSigmas* sigmas = nullptr;  ///< where to put how sure it is of places in the end; null: nobody asks
 };
 
 /// A frame that stages work on.
@@ -39,9 +40,11 @@ struct FrameTask {
   const ClipFrame& frame;
   const Image& covered;              ///< [1,H,W] 1 where the human or an object has been so far, in this frame too
   std::span<const SceneState> done;  ///< the result of the frames before, frame 0 included; none in frame 0
+  std::span<const SceneState> after = {};  ///< where the stages before left those that follow; none in the first pass
 };
 
-/// Frames before the one at hand that terms over the motion see: three differences need as many.
+/// Frames before the one at hand, and after it in a later pass, that terms over the motion see: three differences need
+/// as many.
 inline constexpr std::ptrdiff_t kFramesBefore = 3;
 
 /// Called after every iteration of a frame's stage, with the work of its render. May throw to end the stage.

@@ -258,6 +258,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
     else
       log_message(note.level, note.text);
   }
+  config = with_passes(config);
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));  // without what programs outside make
   const int threads = options.threads > 0 ? options.threads : config.threads;

@@ -63,10 +63,12 @@ std::vector<SceneState> given_states(const Clip& clip, Index frames) {
 }  // namespace
 
 StageInputs::StageInputs(const RunConfig& asked, const std::vector<LossTerm>& terms, const StageChoice& choice)
-    : config(asked), losses(terms), stage(stage_index(asked, choice)) {
+    : config(asked), losses(terms) {
   if (!config.chain.empty())
     throw UserError(choice.stage_option + ": the config is a chain; allowed: that of one clip");
   prepare_run(config);
+  config = with_passes(config);
+  stage = stage_index(config, choice);
   take_sources(config, choice.stage_option);
   clip = read_run_clip(config, losses);
   check_run_clip(config, clip);

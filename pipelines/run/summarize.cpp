@@ -348,7 +348,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   add_image_errors(progress.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
   add_contact(config, clip, progress, summary);
   if (clip.surface) add_penetration(config, clip, progress, summary);
-  add_sigmas(clip, result_of(progress), progress.sigmas, summary);
+  if (config.uncertainty) add_sigmas(clip, result_of(progress), progress.sigmas, summary);
   add_seen_objects(progress, summary);
   add_people(clip, result_of(progress), summary);
   summary.quality = quality_of(summary.metrics.back().values, clip.frame_rate);

@@ -337,6 +337,14 @@ TEST_CASE("loss terms of joints have the gradients of complex steps") {
   check_loss("smooth", joints, fill, [](const ComplexInputs& in) {
     return steps_between(in[0], kStill - 1, kFrames - 1) / static_cast<double>(kMoving);
   });
+  check_loss(
+      "smooth", {joints[0], {"joints_after", shape_of(2, 66)}},
+      [](Inputs& given, const Vars& in) { given.joints = in[0], given.joints_after = in[1]; },
+      [](const ComplexInputs& in) {
+        Complex sum = steps_between(in[0], kStill - 1, kFrames - 1);
+        for (std::size_t i = 0; i < 66; ++i) sum += square(in[1][i] - in[0][66 * (kFrames - 1) + i]);
+        return sum / static_cast<double>(kMoving + 1);
+      });
   check_loss("foot_sliding", joints, fill, [](const ComplexInputs& in) {  // all feet stand
     Complex sum = 0;
     for (std::size_t t = kStill - 1; t + 1 < kFrames; ++t) {

@@ -40,7 +40,7 @@ const std::string kSections =
     "color_net, "
     "synthetic, render, "
     "skip, "
-    "approx, log, stages";
+    "approx, log, passes, stages";
 
 // A config with one stage, `inside` its braces.
 std::string stage(const std::string& inside) { return "{\"stages\": {\"camera\": {\n" + inside + "}}}"; }

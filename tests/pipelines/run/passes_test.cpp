@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/avatar.h"
 #include "body/motion_io.h"
 #include "core/check.h"
 #include "core/image_io.h"
@@ -200,6 +201,81 @@ TEST_CASE("a run with passes has the same bits for any number of threads", "[run
   execute_tiny(passes_config(), "one", 1);
   execute_tiny(passes_config(), "two", 2);
   CHECK(differences("one", "two") == kNone);
+}
+
+TEST_CASE("passes.count makes the passes that stages written out make, to the same bits", "[run][passes]") {
+  const TemporaryFolder here;
+  RunConfig counted = up_to(passes_config(), 3);
+  counted.passes = {.count = 2, .iterations_share = 0.75, .lr_share = 0.5};
+  execute_tiny(counted, "counted");
+  RunConfig written = up_to(passes_config(), 3);
+  StageSettings again = written.stages[1].second;
+  again.iterations = 3;
+  for (auto& [name, group] : again.optimize) group.lr /= 2;
+  written.stages.emplace_back("interaction_2", again);
+  written.stages.emplace_back("refinement_2", written.stages[2].second);
+  execute_tiny(written, "written");
+  CHECK(differences("counted", "written") == kNone);
+  CHECK(json_of("counted/summary.json")["metrics"].size() == 5);
+  execute_tiny(counted, "counted", 1, true);  // what is resumed is the same run
+}
+
+TEST_CASE("in a later pass smooth sees the frames that follow", "[run][passes]") {
+  const TemporaryFolder here;
+  RunConfig config = up_to(passes_config({"stages.again.losses.smooth.order=2"}), 5);
+  config.stages.erase(config.stages.begin() + 3);  // the camera
+  execute_tiny(up_to(config, 3), "once");
+  execute_tiny(config, "twice");
+  const Clip clip = read_run_clip(config, loss_terms());
+  std::vector<std::vector<double>> joints;
+  for (const BodyPose& pose : read_motion("once/motion.npz").poses)
+    joints.push_back(pose_skeleton(clip.avatar, pose).joints);
+  // Of frame 1: of frames 0 to 2, and of 1 to 3, of which those after it are where the pass before left them.
+  double sum = 0;
+  for (std::size_t t = 0; t < 2; ++t) {
+    for (std::size_t i = 0; i < 66; ++i) {
+      const double d = joints[t + 2][i] - 2 * joints[t + 1][i] + joints[t][i];
+      sum += d * d;
+    }
+  }
+  int compared = 0;
+  for (const nlohmann::json& line : metrics_of("twice")) {
+    if (line["stage"] != "again" || line["iteration"] != 0 || line["frame"] != 1) continue;
+    CHECK(line["losses"]["smooth"].get<double>() == Approx(sum / 2).epsilon(1e-3));
+    ++compared;
+  }
+  CHECK(compared == 1);
+}
+
+TEST_CASE("fit by sigma is as sure as each pass is, tells nobody, and is resumed to the same bits", "[run][passes]") {
+  const TemporaryFolder here;
+  const std::vector<std::string> by_sigma = {"stages.refinement.losses.fit.by_sigma=true",
+                                             "stages.refinement_again.losses.fit.by_sigma=true"};
+  const RunConfig config = passes_config(by_sigma);
+  execute_tiny(config, "whole");
+  CHECK(read_joint_sigmas("whole/motion.npz").empty());
+  CHECK_FALSE(json_of("whole/summary.json")["metrics"].back().contains("sigma_depth_mm"));
+  execute_tiny(passes_config(), "plain");
+  const auto places = [](const char* folder) { return read_motion(std::string(folder) + "/motion.npz").poses; };
+  CHECK(places("whole")[1].transl != places("plain")[1].transl);
+  check_stopped_after(config, kFirst + kSmooth + kAgain + 1,
+                      "interrupted in frame 2 of pass 2; the frames before it and pass 1 are finished and kept");
+  // A run that tells how sure it is has the same result.
+  std::vector<std::string> telling = by_sigma;
+  telling.emplace_back("uncertainty=true");
+  execute_tiny(passes_config(telling), "telling");
+  CHECK(places("telling")[1].transl == places("whole")[1].transl);
+  CHECK(read_joint_sigmas("telling/motion.npz").size() == 44 * kTinyFrames);
+}
+
+TEST_CASE("fit by sigma is refused where no stage tells how sure places are", "[passes]") {
+  RunConfig config = passes_config({"stages.refinement.losses.fit.by_sigma=true"});
+  std::erase_if(config.stages,
+                [](const auto& stage) { return stage.first == "interaction" || stage.first == "again"; });
+  const std::vector<RunProblem> problems = run_problems(config, ConfigUse::kStages);
+  REQUIRE(problems.size() == 1);
+  CHECK(problems[0].pointer == "/stages/refinement/losses/fit/by_sigma");
+  CHECK_THAT(problems[0].text, Contains("no stage over frames moves human and objects"));
 }
 
 TEST_CASE("the best start is one of the first pass", "[passes]") {

@@ -102,6 +102,11 @@ TEST_CASE("two people of a generated clip are found, each against its truth", "[
 
 TEST_CASE("a run with two people has the same bits on any number of threads, and when it is resumed", "[run][people]") {
   const TwoPeople clip;
+  clip.change_config([](nlohmann::ordered_json& config) {  // sigmas of both
+    config["stages"]["refinement"] = nlohmann::ordered_json::parse(R"({
+      "over": "sequence", "iterations": 3, "optimize": {"transl": {"lr": 0.001}},
+      "losses": {"fit": {"by_sigma": true}, "smooth": {}}})");
+  });
   RunConfig config = clip.config({"stages.interaction.iterations=4", "color_net.use=on", "color_net.features=4",
                                   "color_net.hidden_width=8", "start.objects=best", "remove_depth_bias=true"});
   move_colors(config);

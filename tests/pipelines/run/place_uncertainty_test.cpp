@@ -203,7 +203,7 @@ TEST_CASE("how sure places are has the same bits on any number of threads, and a
 
 TEST_CASE("a run without a stage that compares pixels cannot tell how sure it is") {
   RunConfig config = tiny_config({"uncertainty=true"});
-  CHECK(stage_of_sigmas(config) == 1);
+  CHECK(stages_of_sigmas(config) == std::vector<std::size_t>{1});
   config.stages.pop_back();
   const std::vector<RunProblem> problems = run_problems(config, ConfigUse::kStages);
   REQUIRE(problems.size() == 1);

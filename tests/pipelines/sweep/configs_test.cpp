@@ -133,6 +133,8 @@ TEST_CASE(
     "the table of AnyInteraction has the paper's clips, by its schedule and by best.json without its refinement") {
   nlohmann::json best = method_of(resolved_file(shipped("best.json")));
   REQUIRE(best["stages"].erase("refinement") == 1);
+  best["passes"]["count"] = 1;
+  best["stages"]["interaction"]["iterations"] = 200;
   std::map<std::string, nlohmann::json> methods = {
       {"paper", method_of(resolved_file(shipped("anyinteraction/base.json")))}, {"best", best}};
   std::map<std::string, std::set<std::string>> clips, datasets;
@@ -169,7 +171,7 @@ TEST_CASE("the sweep of the ablations and the configs of them leave out the same
     CHECK(nlohmann::json::diff(in_sweep[in_block], method).dump() == "[]");
     CHECK(method != in_sweep[in_block == name ? "whole" : "paper, whole"]);
   }
-  CHECK(in_sweep.size() == configs + 3 + std::size(kReadings));  // two to compare with, and constant_rates
+  CHECK(in_sweep.size() == configs + 5 + std::size(kReadings));  // two to compare with, passes, sigmas, constant_rates
   for (const auto& [name, method] : ablations_of("ablation_table.json")) {
     INFO(name);
     REQUIRE(in_sweep.contains(name));

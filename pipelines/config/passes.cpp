@@ -1,0 +1,67 @@
+#include "pipelines/config/passes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+#include "pipelines/config/parameter_groups.h"
+#include "pipelines/config/run_config.h"
+
+namespace hsi4d {
+
+namespace {
+
+bool is_of_pass(const StageSettings& stage) {
+  return stage.over == StageScope::kSequence || (stage.over == StageScope::kFrame && stage.draw == Draw::kAll);
+}
+
+/// An iteration of the first pass in a further one.
+int in_pass(int iteration, double share) { return static_cast<int>(std::floor(iteration * share)); }
+
+StageSettings again(StageSettings stage, const PassSettings& passes) {
+  if (stage.over == StageScope::kSequence) return stage;
+  const double share = passes.iterations_share;
+  stage.iterations = std::max(1, in_pass(stage.iterations, share));
+  for (auto& [name, group] : stage.optimize) {
+    if (name != kColorNetGroup && name != kFeaturesGroup) group.lr *= passes.lr_share;
+    group.from = std::min(in_pass(group.from, share), stage.iterations - 1);
+    if (group.until) group.until = std::max(in_pass(*group.until, share), group.from + 1);
+  }
+  return stage;
+}
+
+}  // namespace
+
+void describe(ConfigFields& f, PassSettings& s) {
+  f.integer("count", s.count, {.min = 1, .max = 10},
+            "How often the stages go through the frames: those that draw everything and those over the sequence");
+  f.number("iterations_share", s.iterations_share, {.above = 0, .max = 10},
+           "Iterations of a further pass in a frame, as a share of those of the first");
+  f.number("lr_share", s.lr_share, {.above = 0, .max = 10},
+           "Its learning rates likewise, but for those of the color net and its features");
+}
+
+bool are_passes_idle(const RunConfig& config) {
+  return config.passes.count > 1 && std::none_of(config.stages.begin(), config.stages.end(), [](const auto& stage) {
+           return stage.second.over == StageScope::kSequence;
+         });
+}
+
+RunConfig with_passes(const RunConfig& config) {
+  RunConfig all = config;
+  all.passes = {};
+  if (are_passes_idle(config)) return all;
+  for (int pass = 2; pass <= config.passes.count; ++pass) {
+    for (const auto& [name, stage] : config.stages) {
+      if (!is_of_pass(stage)) continue;
+      const std::string copy = name + "_" + std::to_string(pass);
+      if (find_entry(config.stages, copy) != nullptr)
+        throw UserError("/passes/count: the pass " + std::to_string(pass) + " needs the name of the stage " + copy +
+                        "; allowed: fewer passes, or another name");
+      all.stages.emplace_back(copy, again(stage, config.passes));
+    }
+  }
+  return all;
+}
+
+}  // namespace hsi4d
