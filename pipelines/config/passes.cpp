@@ -19,7 +19,12 @@ bool is_of_pass(const StageSettings& stage) {
 int in_pass(int iteration, double share) { return static_cast<int>(std::floor(iteration * share)); }
 
 StageSettings again(StageSettings stage, const PassSettings& passes) {
-  if (stage.over == StageScope::kSequence) return stage;
+  if (stage.over == StageScope::kSequence) {
+    for (auto& [name, loss] : stage.losses) {
+      if (name == "smooth") loss.weight *= passes.smooth_share;
+    }
+    return stage;
+  }
   const double share = passes.iterations_share;
   stage.iterations = std::max(1, in_pass(stage.iterations, share));
   for (auto& [name, group] : stage.optimize) {
@@ -39,6 +44,8 @@ void describe(ConfigFields& f, PassSettings& s) {
            "Iterations of a further pass in a frame, as a share of those of the first");
   f.number("lr_share", s.lr_share, {.above = 0, .max = 10},
            "Its learning rates likewise, but for those of the color net and its features");
+  f.number("smooth_share", s.smooth_share, {.min = 0, .max = 10},
+           "The weight of `smooth` in its stages over the sequence likewise");
 }
 
 bool are_passes_idle(const RunConfig& config) {

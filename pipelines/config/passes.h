@@ -12,6 +12,7 @@ struct PassSettings {
   int count = 1;
   double iterations_share = 0.67;  ///< of a further pass, of those of the first
   double lr_share = 0.5;           ///< likewise
+  double smooth_share = 1;         ///< of the weight of `smooth` over the sequence: what was far off has been found
 };
 
 void describe(ConfigFields& fields, PassSettings& settings);
@@ -19,8 +20,8 @@ void describe(ConfigFields& fields, PassSettings& settings);
 /// The config with its further passes written out, and one pass to go: after the last stage come copies of all stages
 /// that draw everything in a frame and of those over the sequence, NAME_2 of NAME in the second pass and so on. Of
 /// stages over frames iterations and rates are the shares of those of the first pass, but for the rates of color nets
-/// and features, which go on learning. Without a stage over the sequence nothing lies between passes, and there is one.
-/// Throws UserError where a stage has such a name already.
+/// and features, which go on learning; of stages over the sequence the weight of `smooth` is. Without a stage over the
+/// sequence nothing lies between passes, and there is one. Throws UserError where a stage has such a name already.
 RunConfig with_passes(const RunConfig& config);
 
 /// Whether further passes are asked for and there are none.

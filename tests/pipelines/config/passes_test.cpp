@@ -19,7 +19,7 @@ using Catch::Matchers::Contains;
 namespace {
 
 constexpr const char* kStages = R"({
-  "passes": {"count": 3, "iterations_share": 0.5, "lr_share": 0.1},
+  "passes": {"count": 3, "iterations_share": 0.5, "lr_share": 0.1, "smooth_share": 0.2},
   "stages": {
     "first": {"over": "first_frame", "iterations": 9, "optimize": {"transl": {"lr": 1}}, "losses": {"photometric": {}}},
     "camera": {"iterations": 20, "draw": "scene", "optimize": {"camera": {"lr": 1}}, "losses": {"photometric": {}}},
@@ -32,7 +32,7 @@ constexpr const char* kStages = R"({
       "losses": {"photometric": {"weight": 2}}
     },
     "refinement": {
-      "over": "sequence", "iterations": 5, "optimize": {"transl": {"lr": 4}}, "losses": {"fit": {}}
+      "over": "sequence", "iterations": 5, "optimize": {"transl": {"lr": 4}}, "losses": {"fit": {}, "smooth": {"weight": 0.5}}
     }
   }
 })";
@@ -65,11 +65,15 @@ TEST_CASE("passes are copies of the stages that draw everything and of those ove
     CHECK(find_entry(stage.losses, "photometric")->weight == 2);
     CHECK(config.stages[copy + 1].second.iterations == 5);
     CHECK(rate(config.stages[copy + 1].second, kTranslGroup) == 4);
+    CHECK(find_entry(config.stages[copy + 1].second.losses, "fit")->weight == 1);
+    CHECK(find_entry(config.stages[copy + 1].second.losses, "smooth")->weight == Approx(0.1));
   }
   const std::vector<LossDescription> losses = descriptions_of(loss_terms());
   CHECK(resolved_config(with_passes(config), losses) == resolved_config(config, losses));
   CHECK(resolved_config(with_passes(config_of({"passes.count=1"})), losses) ==
-        resolved_config(config_of({"passes={\"count\": 1, \"iterations_share\": 0.67, \"lr_share\": 0.5}"}), losses));
+        resolved_config(
+            config_of({"passes={\"count\": 1, \"iterations_share\": 0.67, \"lr_share\": 0.5, \"smooth_share\": 1}"}),
+            losses));
 }
 
 TEST_CASE("without a stage over the sequence there is one pass, and a run warns of it") {
