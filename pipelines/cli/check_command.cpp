@@ -58,7 +58,7 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
     for (const ChainClip& clip : config.chain) names.push_back(clip.name);
     text += "  chain of " + count_text(std::ssize(names), "clip") + " (" + joined(names) + ")\n";
   }
-  for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
+  for (const auto& [name, stage] : with_passes(config).stages) text += stage_summary(name, stage);
   if (config.stages.empty()) text += "  no stages\n";
   text += "  the config alone is checked; `hsi4d run " + file.generic_string() + " --dry-run` reads its inputs\n";
   for (const RunProblem& problem : run_problems(config, ConfigUse::kRun))

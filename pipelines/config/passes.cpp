@@ -35,6 +35,16 @@ StageSettings again(StageSettings stage, const PassSettings& passes) {
   return stage;
 }
 
+/// Calls f(name, stage of the first pass) for all copies.
+template <class F>
+void for_copies(const RunConfig& config, const F& f) {
+  for (int pass = 2; pass <= config.passes.count; ++pass) {
+    for (const auto& [name, stage] : config.stages) {
+      if (is_of_pass(stage)) f(name + "_" + std::to_string(pass), stage);
+    }
+  }
+}
+
 }  // namespace
 
 void describe(ConfigFields& f, PassSettings& s) {
@@ -54,20 +64,23 @@ bool are_passes_idle(const RunConfig& config) {
          });
 }
 
+std::vector<std::string> stages_in_the_way(const RunConfig& config) {
+  std::vector<std::string> names;
+  if (are_passes_idle(config)) return names;
+  for_copies(config, [&](const std::string& name, const StageSettings&) {
+    if (find_entry(config.stages, name) != nullptr) names.push_back(name);
+  });
+  return names;
+}
+
 RunConfig with_passes(const RunConfig& config) {
+  HSI4D_CHECK(stages_in_the_way(config).empty(), "stages have the names of passes");
   RunConfig all = config;
   all.passes = {};
   if (are_passes_idle(config)) return all;
-  for (int pass = 2; pass <= config.passes.count; ++pass) {
-    for (const auto& [name, stage] : config.stages) {
-      if (!is_of_pass(stage)) continue;
-      const std::string copy = name + "_" + std::to_string(pass);
-      if (find_entry(config.stages, copy) != nullptr)
-        throw UserError("/passes/count: the pass " + std::to_string(pass) + " needs the name of the stage " + copy +
-                        "; allowed: fewer passes, or another name");
-      all.stages.emplace_back(copy, again(stage, config.passes));
-    }
-  }
+  for_copies(config, [&](const std::string& name, const StageSettings& stage) {
+    all.stages.emplace_back(name, again(stage, config.passes));
+  });
   return all;
 }
 

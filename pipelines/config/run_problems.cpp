@@ -267,6 +267,12 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_unknown_problems(config, found);
   add_given_frame_problems(config, found);
   add_sigma_problems(config, found);
+  const std::vector<std::string> taken = stages_in_the_way(config);
+  if (!taken.empty())
+    found.push_back({"/passes/count",
+                     "further passes need the names of the stages " + joined(taken) +
+                         "; allowed: 1, or other names of these stages",
+                     {"/passes/count", "/stages"}});
   add_input_problems(config, use, found);
   return found;
 }

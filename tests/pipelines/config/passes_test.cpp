@@ -99,10 +99,9 @@ TEST_CASE("a stage that has the name of a further pass is refused") {
       "a_2": {"iterations": 1, "optimize": {"transl": {"lr": 1}}, "losses": {"photometric": {}}},
       "r": {"over": "sequence", "iterations": 1, "optimize": {"transl": {"lr": 1}}, "losses": {"fit": {}}}
     }})");
-  const RunConfig config = load_run_config("config.json", {}, descriptions_of(loss_terms()));
-  CHECK_THROWS_WITH(with_passes(config),
-                    "/passes/count: the pass 2 needs the name of the stage a_2; allowed: fewer "
-                    "passes, or another name");
+  CHECK_THROWS_WITH(load_run_config("config.json", {}, descriptions_of(loss_terms()), ConfigUse::kStages),
+                    Contains("/passes/count: further passes need the names of the stages a_2; allowed: 1, or other "
+                             "names of these stages"));
   CHECK_THROWS_WITH(config_of({"passes.count=0"}), Contains("/passes/count"));
   CHECK_THROWS_WITH(config_of({"passes.iterations_share=0"}), Contains("/passes/iterations_share"));
 }
