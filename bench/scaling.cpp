@@ -123,6 +123,7 @@ RunConfig config_of_round(RunConfig config, int repeats) {
       settings.until.reset();
     }
   }
+  config.passes = {};  // each stage is measured once
   return config;
 }
 

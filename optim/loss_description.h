@@ -28,7 +28,7 @@ enum class LossInput {
   kTracks,         ///< tracks, tracks_target: where data.tracks has some on what moves; likewise
   kUnknowns,       ///< unknowns: in a stage over the first frame that moves some
   kPose,           ///< body_rotations
-  kMotion,         ///< joints, joints_start, motion, body_points
+  kMotion,         ///< joints, joints_start, joints_after, motion, body_points
   kSigmas,         ///< joints_sigma, view_axes: in a stage over the sequence that a run makes
   kObjectMotion,   ///< object_points, and motion with objects
   kContacts,       ///< motion->contacts, with body_points and object_points: where data.contacts is given

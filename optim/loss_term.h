@@ -82,8 +82,8 @@ struct LossInputs {
   Var<S> joints_after;  ///< [A,66] what they are in the A frames that follow, up to three; a stage of one frame that is
                         ///< gone through again knows them, else none is given
   Var<S> joints_sigma;  ///< [F,44] how sure they are, of each joint one standard deviation across the view and one
-                        ///< along it, metres; +∞: nothing tells, not a number: nobody looked; only for terms that
-                        ///< need kSigmas, as the next one
+                        ///< along it, metres. Infinite: nothing tells; not a number: nobody looked. Only for terms
+                        ///< that need kSigmas, as the next one
   Var<S> view_axes;     ///< [F,3] the cameras' z in the world, of length 1
   std::shared_ptr<const MotionStart> motion;  ///< what was where when the stage began; null: not given
   /// Record places of some points of the human, all of one set, and of some of the objects' Gaussians, [P,3] metres,
@@ -129,6 +129,7 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.depth_target = {};
   if (lacks(LossInput::kDepthMap)) inputs.depth = inputs.depth_map = inputs.depth_map_weight = {};
   if (lacks(LossInput::kDepths) && lacks(LossInput::kDepthMap)) inputs.transmittance = {};
+  if (lacks(LossInput::kSigmas)) inputs.joints_sigma = inputs.view_axes = {};
   if (lacks(LossInput::kUnknowns)) inputs.unknowns = {};
   if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
   if (lacks(LossInput::kLook)) inputs.color_change = inputs.shape_change = {};

@@ -36,7 +36,7 @@ Config made(const py::dict& tree, const fs::path& folder, const py::object& over
 
 std::vector<std::string> stage_names(const Config& config) {
   std::vector<std::string> names;
-  for (const auto& [name, stage] : config.settings.stages) names.push_back(name);
+  for (const auto& [name, stage] : with_passes(config.settings).stages) names.push_back(name);
   return names;
 }
 

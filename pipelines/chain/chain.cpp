@@ -158,7 +158,8 @@ RunConfig started_config(const RunConfig& chain, std::size_t index, const ChainP
 }
 
 bool says_done(const RunConfig& clip, const std::string& folder, const std::vector<LossTerm>& losses) {
-  return look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) == RunState::kDone;
+  const std::string identity = resolved_config(with_passes(clip), descriptions_of(losses));
+  return look_at_run_folder(folder, identity, true) == RunState::kDone;
 }
 
 /// The inputs of a clip that is done, with what programs made for it. Throws DataError for what is not there any more:

@@ -16,7 +16,7 @@ bool is_of_pass(const StageSettings& stage) {
 }
 
 /// An iteration of the first pass in a further one.
-int in_pass(int iteration, double share) { return static_cast<int>(std::floor(iteration * share)); }
+int in_pass(int iteration, double share) { return static_cast<int>(std::lround(iteration * share)); }
 
 StageSettings again(StageSettings stage, const PassSettings& passes) {
   if (stage.over == StageScope::kSequence) {

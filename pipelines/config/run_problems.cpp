@@ -211,11 +211,9 @@ bool moves_all_by_pixels(const StageSettings& stage) {
 
 }  // namespace
 
-bool needs_sigmas(const RunConfig& config) {
-  return config.uncertainty || std::any_of(config.stages.begin(), config.stages.end(), [](const auto& stage) {
-           const auto weighs = [](const auto& loss) { return needs_input(loss.second, LossInput::kSigmas); };
-           return std::any_of(stage.second.losses.begin(), stage.second.losses.end(), weighs);
-         });
+bool weighs_by_sigma(const StageSettings& stage) {
+  return std::any_of(stage.losses.begin(), stage.losses.end(),
+                     [](const auto& loss) { return needs_input(loss.second, LossInput::kSigmas); });
 }
 
 std::vector<std::size_t> stages_of_sigmas(const RunConfig& config) {
@@ -225,7 +223,7 @@ std::vector<std::size_t> stages_of_sigmas(const RunConfig& config) {
     const StageSettings& stage = config.stages[s].second;
     if (stage.over == StageScope::kSequence) is_pass_told = false;
     if (is_pass_told || stage.over != StageScope::kFrame || !moves_all_by_pixels(stage)) continue;
-    all.push_back(s);
+    all.insert(all.begin(), s);
     is_pass_told = true;
   }
   return all;
@@ -235,17 +233,22 @@ namespace {
 
 /// Settings that ask how sure places are where no stage tells it.
 void add_sigma_problems(const RunConfig& config, std::vector<RunProblem>& found) {
-  if (config.stages.empty() || !stages_of_sigmas(config).empty()) return;
-  const auto refuse = [&found](const std::string& setting) {
-    found.push_back({setting,
-                     "no stage over frames moves human and objects and compares images or masks; allowed: false",
-                     {setting, "/stages"}});
+  const std::vector<std::size_t> telling = stages_of_sigmas(config);
+  const auto refuse = [&found](const std::string& setting, const char* what) {
+    found.push_back({setting, std::string(what) + "; allowed: false", {setting, "/stages"}});
   };
-  if (config.uncertainty) refuse("/uncertainty");
-  for (const auto& [name, stage] : config.stages) {
+  if (config.uncertainty && !config.stages.empty() && telling.empty())
+    refuse("/uncertainty", "no stage over frames moves human and objects and compares images or masks");
+  for (std::size_t s = 0; s < config.stages.size(); ++s) {
+    const auto& [name, stage] = config.stages[s];
     for (const auto& [term, loss] : stage.losses) {
-      if (needs_input(loss, LossInput::kSigmas))
-        refuse(child_pointer(child_pointer("/stages", name) + "/losses", term) + "/by_sigma");
+      if (!needs_input(loss, LossInput::kSigmas)) continue;
+      const std::string setting = child_pointer(child_pointer("/stages", name) + "/losses", term) + "/by_sigma";
+      if (stage.over != StageScope::kSequence) {
+        refuse(setting, "a stage over the sequence alone knows how sure places are");
+      } else if (telling.empty() || telling.front() > s) {
+        refuse(setting, "no stage over frames before it moves human and objects and compares images or masks");
+      }
     }
   }
 }
@@ -267,6 +270,10 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_unknown_problems(config, found);
   add_given_frame_problems(config, found);
   add_sigma_problems(config, found);
+  if (config.passes.count > 1 && !are_passes_idle(config) && config.stages.back().second.over != StageScope::kSequence)
+    found.push_back({"/passes/count",
+                     "the last stage is over frames, and would be of one pass with those that follow; allowed: 1",
+                     {"/passes/count", "/stages"}});
   const std::vector<std::string> taken = stages_in_the_way(config);
   if (!taken.empty())
     found.push_back({"/passes/count",

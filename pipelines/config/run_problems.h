@@ -11,8 +11,8 @@
 
 namespace hsi4d {
 
-/// Whether a run looks how sure places are: it is asked to tell it, or a loss weighs by it.
-bool needs_sigmas(const RunConfig& config);
+/// Whether a loss of the stage weighs by how sure places are.
+bool weighs_by_sigma(const StageSettings& stage);
 
 /// The stages whose ends tell how sure places are: of each pass the last that moves what moves and compares pixels.
 std::vector<std::size_t> stages_of_sigmas(const RunConfig& config);

@@ -175,9 +175,12 @@ class Estimate {
       if (noise.count > 0)
         priors = count * noise.square / (noise.together * noise.absolute * weight_of(LossInput::kImage));
     }
-    for (const auto& [input, opacity, masks, seen] :
-         {std::tuple{LossInput::kHumanOpacity, inputs_.human_opacity, inputs_.human_mask, inputs_.human_seen},
-          {LossInput::kObjectOpacity, inputs_.object_opacity, inputs_.object_masks, inputs_.object_seen}}) {
+    std::vector<std::tuple<LossInput, Var<S>, Var<S>, Var<S>>> silhouettes = {
+        {LossInput::kHumanOpacity, inputs_.human_opacity, inputs_.human_mask, inputs_.human_seen},
+        {LossInput::kObjectOpacity, inputs_.object_opacity, inputs_.object_masks, inputs_.object_seen}};
+    for (const LossInputs<S>& other : inputs_.others)
+      silhouettes.emplace_back(LossInput::kHumanOpacity, other.human_opacity, other.human_mask, other.human_seen);
+    for (const auto& [input, opacity, masks, seen] : silhouettes) {
       if (!some_need(stage_, input) || !inputs_.given(opacity)) continue;
       const Noise noise = edge_noise(opacity, masks, seen);
       if (noise.count == 0) continue;

@@ -106,6 +106,21 @@ std::string stop_message(Index frame, Index frames, Index first) {
          " finished and kept";
 }
 
+/// Those stages that tell how sure places are for somebody who asks: for a loss of a stage that follows, before the
+/// next one that tells it, and the last one where a run is asked to tell it.
+std::vector<std::size_t> sigma_stages(const RunConfig& config) {
+  const std::vector<std::size_t> telling = stages_of_sigmas(config);
+  std::vector<std::size_t> needed;
+  for (std::size_t i = 0; i < telling.size(); ++i) {
+    const bool is_last = i + 1 == telling.size();
+    const std::size_t end = is_last ? config.stages.size() : telling[i + 1];
+    bool is_read = is_last && config.uncertainty;
+    for (std::size_t s = telling[i]; s < end; ++s) is_read = is_read || weighs_by_sigma(config.stages[s].second);
+    if (is_read) needed.push_back(telling[i]);
+  }
+  return needed;
+}
+
 class Reconstruction {
  public:
   Reconstruction(const RunConfig& config, Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
@@ -121,7 +136,7 @@ class Reconstruction {
         frame_stages_(order_.frames),
         progress_(first_progress(clip_, frame_stages_, first_nets(config, clip))),
         sigmas_(no_sigmas(clip.objects.size(), clip.others.size())),
-        sigma_stages_(needs_sigmas(config) ? stages_of_sigmas(config) : std::vector<std::size_t>{}),
+        sigma_stages_(sigma_stages(config)),
         hidden_(config, clip, progress_.seen, [&folder](const std::string& text) { folder.note(text); }),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}

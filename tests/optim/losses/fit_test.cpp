@@ -32,6 +32,16 @@ std::vector<double> some_sigmas() {
   return sigmas;
 }
 
+/// Of length 1.
+std::vector<double> some_axes() {
+  std::vector<double> axes;
+  for (Index t = 0; t < kFrames; ++t) {
+    const Vector3<double> axis = Vector3<double>(0.3, std::sin(static_cast<double>(t)), 1).normalized();
+    axes.insert(axes.end(), axis.data(), axis.data() + 3);
+  }
+  return axes;
+}
+
 template <class S>
 LossInputs<S> inputs_of(Var<S> joints, Var<S> start, Var<S> axes, const std::vector<double>& sigmas) {
   LossInputs<S> in;
@@ -77,7 +87,7 @@ TEST_CASE("fit by sigma passes the gradient check", "[parallel]") {
   check_operator("fit",
                  {{"joints", shape_of(kFrames, 66), -0.05, 0.05},
                   {"joints_start", shape_of(kFrames, 66), -0.05, 0.05},
-                  {"view_axes", shape_of(kFrames, 3)}},
+                  {"view_axes", shape_of(kFrames, 3), 0, 0, some_axes()}},
                  [&](const auto& in) {
                    return record_term("fit", inputs_of(in[0], in[1], in[2], sigmas), R"({"by_sigma": true})");
                  },

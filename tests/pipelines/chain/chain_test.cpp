@@ -144,6 +144,25 @@ TEST_CASE("a chain that was stopped anywhere and resumed has the bits of one tha
   }
 }
 
+TEST_CASE("a chain whose clips have two passes is resumed behind its first clip", "[run][chain]") {
+  const TemporaryFolder here;
+  const RunConfig config = changed_config([](auto& chain) {
+    chain["passes"] = {{"count", 2}};
+    for (const char* stage : {"camera", "interaction"}) chain["stages"][stage]["iterations"] = 2;
+    chain["stages"]["refinement"] = nlohmann::ordered_json::parse(R"({
+      "over": "sequence", "iterations": 2, "optimize": {"transl": {"lr": 0.001}}, "losses": {"fit": {}, "smooth": {}}})");
+  });
+  execute_tiny_chain(config, "run");
+  fs::rename("run", "whole");
+  int count = 0;
+  CHECK_THROWS_AS(execute_tiny_chain(config, "run", 1, false,
+                                     [&] { return fs::exists("run/clips/clip2/log.txt") && ++count == 5; }),
+                  Interrupted);
+  CHECK(finished_clips(config, "run", loss_terms()) == 1);
+  execute_tiny_chain(config, "run", 2, true);
+  check_same_chains("run", "whole");
+}
+
 TEST_CASE("a chain does not go on with a clip that is done of other frames", "[run][chain]") {
   const TemporaryFolder here;
   fs::copy(TinyChain::folder(), "data", fs::copy_options::recursive);

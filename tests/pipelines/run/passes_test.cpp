@@ -1,4 +1,5 @@
 // Runs that go through the frames again after a stage over the sequence.
+#include <algorithm>
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -268,14 +269,47 @@ TEST_CASE("fit by sigma is as sure as each pass is, tells nobody, and is resumed
   CHECK(read_joint_sigmas("telling/motion.npz").size() == 44 * kTinyFrames);
 }
 
+TEST_CASE("of each pass the last stage that moves all by pixels tells how sure places are", "[passes]") {
+  CHECK(stages_of_sigmas(passes_config()) == std::vector<std::size_t>{1, 4});
+  RunConfig config = passes_config();
+  config.stages.insert(config.stages.begin() + 1, config.stages[1]);  // two of them side by side
+  CHECK(stages_of_sigmas(config) == std::vector<std::size_t>{2, 5});
+  // The first pass has its own: its refinement alone weighs by them.
+  const TemporaryFolder here;
+  execute_tiny(up_to(passes_config(), 3), "plain");
+  execute_tiny(up_to(passes_config({"stages.refinement.losses.fit.by_sigma=true"}), 3), "weighed");
+  CHECK(read_motion("plain/motion.npz").poses[1].transl != read_motion("weighed/motion.npz").poses[1].transl);
+}
+
 TEST_CASE("fit by sigma is refused where no stage tells how sure places are", "[passes]") {
-  RunConfig config = passes_config({"stages.refinement.losses.fit.by_sigma=true"});
-  std::erase_if(config.stages,
-                [](const auto& stage) { return stage.first == "interaction" || stage.first == "again"; });
+  const auto problem = [](const RunConfig& config) {
+    const std::vector<RunProblem> problems = run_problems(config, ConfigUse::kStages);
+    return problems.size() == 1 ? problems[0].pointer + ": " + problems[0].text : std::to_string(problems.size());
+  };
+  const RunConfig config = passes_config({"stages.refinement.losses.fit.by_sigma=true"});
+  CHECK(run_problems(config, ConfigUse::kStages).empty());
+  RunConfig before = config;
+  std::erase_if(before.stages, [](const auto& stage) { return stage.first == "interaction"; });
+  CHECK(problem(before) ==
+        "/stages/refinement/losses/fit/by_sigma: no stage over frames before it moves human and objects and compares "
+        "images or masks; allowed: false");
+  RunConfig in_frame = config;
+  in_frame.stages[1].second.losses.push_back(*std::find_if(in_frame.stages[2].second.losses.begin(),
+                                                           in_frame.stages[2].second.losses.end(),
+                                                           [](const auto& loss) { return loss.first == "fit"; }));
+  CHECK(problem(in_frame) ==
+        "/stages/interaction/losses/fit/by_sigma: a stage over the sequence alone knows how sure places are; allowed: "
+        "false");
+}
+
+TEST_CASE("further passes are refused behind a stage over frames", "[passes]") {
+  RunConfig config = passes_config();
+  config.stages.pop_back();
+  config.passes.count = 2;
   const std::vector<RunProblem> problems = run_problems(config, ConfigUse::kStages);
   REQUIRE(problems.size() == 1);
-  CHECK(problems[0].pointer == "/stages/refinement/losses/fit/by_sigma");
-  CHECK_THAT(problems[0].text, Contains("no stage over frames moves human and objects"));
+  CHECK(problems[0].pointer == "/passes/count");
+  CHECK_THAT(problems[0].text, Contains("the last stage is over frames"));
 }
 
 TEST_CASE("the best start is one of the first pass", "[passes]") {
