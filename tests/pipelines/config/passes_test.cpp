@@ -56,10 +56,10 @@ TEST_CASE("passes are copies of the stages that draw everything and of those ove
   CHECK(config.passes.count == 1);
   for (const std::size_t copy : {4u, 6u}) {
     const StageSettings& stage = config.stages[copy].second;
-    CHECK(stage.iterations == 4);
+    CHECK(stage.iterations == 5);
     CHECK(rate(stage, kTranslGroup) == Approx(0.1));
     CHECK(rate(stage, kColorNetGroup) == 3);  // goes on learning
-    CHECK(find_entry(stage.optimize, "body_pose")->from == 3);
+    CHECK(find_entry(stage.optimize, "body_pose")->from == 4);
     CHECK(find_entry(stage.optimize, kOrientGroup)->from == 1);
     CHECK(find_entry(stage.optimize, kOrientGroup)->until == 2);  // it moves in one iteration at least
     CHECK(find_entry(stage.losses, "photometric")->weight == 2);
