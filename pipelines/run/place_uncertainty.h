@@ -15,7 +15,7 @@
 //   mean of r²: f = n / (2 v w).
 // - A rotation of six numbers has three directions: numbers that the columns lose as they become a rotation count for
 //   nothing.
-// - What is held is known: the camera, the color net, all frames before.
+// - What is held is known: the camera, the color net, all frames before, and in a later pass those after.
 #pragma once
 
 #include <vector>

@@ -108,7 +108,7 @@ std::string stop_message(Index frame, Index frames, Index first) {
 
 /// Those stages that tell how sure places are for somebody who asks: for a loss of a stage that follows, before the
 /// next one that tells it, and the last one where a run is asked to tell it.
-std::vector<std::size_t> sigma_stages(const RunConfig& config) {
+std::vector<std::size_t> stages_whose_sigmas_are_read(const RunConfig& config) {
   const std::vector<std::size_t> telling = stages_of_sigmas(config);
   std::vector<std::size_t> needed;
   for (std::size_t i = 0; i < telling.size(); ++i) {
@@ -136,7 +136,7 @@ class Reconstruction {
         frame_stages_(order_.frames),
         progress_(first_progress(clip_, frame_stages_, first_nets(config, clip))),
         sigmas_(no_sigmas(clip.objects.size(), clip.others.size())),
-        sigma_stages_(sigma_stages(config)),
+        sigma_stages_(stages_whose_sigmas_are_read(config)),
         hidden_(config, clip, progress_.seen, [&folder](const std::string& text) { folder.note(text); }),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
