@@ -260,4 +260,39 @@ TEST_CASE("a sequence moves both people, with right gradients", "[sequence_graph
   }
 }
 
+TEST_CASE("each person has its own sigmas, and its own places in the frames that follow", "[people]") {
+  const Clip clip = two_people();
+  const std::vector<SceneState> states = frames_before(clip);
+  std::vector<PlaceSigmas> sigmas(states.size(), no_sigmas(clip.objects.size(), 1));
+  sigmas[1].joints[3] = {0.01, 0.02};
+  sigmas[1].others[0][5] = {0.03, 0.04};
+  Tape<double> tape;
+  SequenceGraph<double> graph(tape, clip, states, nullptr, RotationParameters::kSixD);
+  graph.give_sigmas(states, sigmas);
+  const ConstArray<double> first = tape.value(graph.loss_inputs().joints_sigma),
+                           other = tape.value(graph.loss_inputs().others[0].joints_sigma),
+                           axes = tape.value(graph.loss_inputs().view_axes);
+  CHECK(first(1, 6) == 0.01);
+  CHECK(first(1, 7) == 0.02);
+  CHECK(std::isnan(first(1, 10)));
+  CHECK(other(1, 10) == 0.03);
+  CHECK(other(1, 11) == 0.04);
+  CHECK(std::isnan(other(1, 6)));
+  for (Index i = 0; i < 3; ++i) CHECK(axes(1, i) == states[1].camera_from_world.rotation(2, i));
+
+  Tape<double> of_frame;
+  FrameGraph<double> frame(of_frame, clip, clip.first.camera_from_world, settings_with_masks());
+  frame.set_state(clip.first);
+  frame.give_motion(clip.first, frames_before(clip));
+  frame.give_motion_after(std::span(states).last(2));
+  for (std::size_t p = 0; p < 2; ++p) {
+    const LossInputs<double>& inputs = p == 0 ? frame.loss_inputs() : frame.loss_inputs().others[0];
+    const ConstArray<double> after = of_frame.value(inputs.joints_after);
+    REQUIRE(after.shape.rows == 2);
+    const SceneState& last = states.back();
+    const std::vector<double> joints = pose_skeleton(clip.person(p).avatar, last.person(p)).joints;
+    for (Index i = 0; i < after.shape.cols; ++i) CHECK(after(1, i) == joints[static_cast<std::size_t>(i)]);
+  }
+}
+
 }  // namespace frame_people_test
