@@ -46,10 +46,12 @@ Vector3<double> MotionStart::place(const ObjectPoint& point) const {
   return transform_point(world_from_object[static_cast<std::size_t>(point.frame)][object], at);
 }
 
-bool is_hand_joint(Index joint) {
-  static const std::array wrists = {smplx_joint("left_wrist"), smplx_joint("right_wrist")};
-  const bool is_of_fingers = joint >= kFirstHandJoint && joint < kFirstHandJoint + 2 * kHandJoints;
-  return is_of_fingers || std::find(wrists.begin(), wrists.end(), joint) != wrists.end();
+std::optional<std::size_t> hand_of_joint(Index joint) {
+  for (std::size_t hand = 0; hand < kWristJoints.size(); ++hand) {
+    const Index finger = joint - kFirstHandJoint - static_cast<Index>(hand) * kHandJoints;
+    if (joint == kWristJoints[hand] || (finger >= 0 && finger < kHandJoints)) return hand;
+  }
+  return {};
 }
 
 bool is_foot_joint(Index joint) {

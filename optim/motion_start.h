@@ -2,6 +2,7 @@
 // (hands near an object, feet that stand), once, before the first iteration.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -47,10 +48,11 @@ struct MotionStart {
   const Gaussians* scene = nullptr;                               ///< null: none is known
   Vector3<double> first_camera_center = Vector3<double>::Zero();  ///< of the clip's first frame, metres, world
   Index still_frames = 1;
-  double frame_rate = 10;                                          ///< frames a second
-  PosedJoints first_body;                                          ///< in the clip's first frame
-  std::vector<PosedJoints> body;                                   ///< [F]
-  std::vector<std::vector<Rigid<double>>> world_from_object = {};  ///< [F][O]
+  double frame_rate = 10;         ///< frames a second
+  PosedJoints first_body;         ///< in the clip's first frame
+  std::vector<PosedJoints> body;  ///< [F]
+  /// [F+A][O], in the A frames that follow, too, where the stages before left them, as LossInputs::joints_after.
+  std::vector<std::vector<Rigid<double>>> world_from_object = {};
   /// How far the lower foot goes up and down in the estimate of the whole clip (lower_foot_range), metres; none: there
   /// is no estimate.
   std::optional<double> foot_range = {};
@@ -58,6 +60,7 @@ struct MotionStart {
 
   Index frames() const { return static_cast<Index>(body.size()); }
   Index moving_frames() const { return frames() - still_frames; }
+  Index frames_with_objects() const { return std::ssize(world_from_object); }
 
   const PosedJoints& body_in(Index frame) const {
     return frame == kFirstFrame ? first_body : body[static_cast<std::size_t>(frame)];
@@ -69,8 +72,14 @@ struct MotionStart {
   Vector3<double> place(const ObjectPoint& point) const;
 };
 
+/// The wrists of the SMPL-X layout, left and right.
+inline constexpr std::array<Index, 2> kWristJoints = {20, 21};
+
+/// The hand of a joint that is its wrist or of its fingers: 0 the left one, 1 the right one.
+std::optional<std::size_t> hand_of_joint(Index joint);
+
 /// Joints of the SMPL-X layout that are hands (wrists and fingers), and feet (ankles and balls).
-bool is_hand_joint(Index joint);
+inline bool is_hand_joint(Index joint) { return hand_of_joint(joint).has_value(); }
 bool is_foot_joint(Index joint);
 
 /// Points whose largest weight (of equal ones the first) is that of such a joint, ascending: a part of the human on any

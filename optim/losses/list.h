@@ -18,6 +18,7 @@
   HSI4D_LOSS(fit)               \
   HSI4D_LOSS(contact)           \
   HSI4D_LOSS(annotated_contact) \
+  HSI4D_LOSS(grip)              \
   HSI4D_LOSS(smooth)            \
   HSI4D_LOSS(object_smooth)     \
   HSI4D_LOSS(ground)            \

@@ -56,7 +56,7 @@ std::vector<ObjectPoint> outermost_points(const MotionStart& motion, Index begin
   return points;
 }
 
-/// Where they were when the stage began.
+/// Where they were when the stage began: in frames that stand, and in those that follow.
 template <class S>
 Var<S> standing_places(Tape<S>& tape, const MotionStart& motion, const std::vector<ObjectPoint>& points) {
   const Var<S> places = tape.constant("object_places", shape_of(std::ssize(points), 3));
@@ -74,10 +74,16 @@ Var<S> object_smooth(const LossInputs<S>& in, const ObjectSmoothSettings& settin
   const MotionStart& motion = *in.motion;
   // Differences between frames that stand say nothing.
   const Index first = std::max<Index>(0, motion.still_frames - settings.order);
-  if (motion.frames() - first <= settings.order) return {};
+  const Index last = std::min(motion.frames_with_objects(), motion.frames() + settings.order);
+  if (last - first <= settings.order) return {};
   const Var<S> moving = in.object_points(outermost_points(motion, motion.still_frames, motion.frames()));
-  const std::vector<Var<S>> places = {
-      standing_places(moving.owner(), motion, outermost_points(motion, first, motion.still_frames)), moving};
+  const auto standing = [&](Index begin, Index end) {
+    return standing_places(moving.owner(), motion, outermost_points(motion, begin, end));
+  };
+  std::vector<Var<S>> places;
+  if (first < motion.still_frames) places.push_back(standing(first, motion.still_frames));
+  places.push_back(moving);
+  if (motion.frames() < last) places.push_back(standing(motion.frames(), last));
   Var<S> steps = concat_rows<S>(places);
   const Index in_a_frame = moving.shape().rows / motion.moving_frames();
   for (int k = 0; k < settings.order; ++k) {

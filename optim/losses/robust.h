@@ -45,7 +45,9 @@ T huber(T squared, float scale) {
 /// @param limit  s²
 template <class T>
 T geman_mcclure(T squared, float limit) {
-  return limit * squared / (limit + squared);
+  const T near = limit * squared / (limit + squared), far = limit - limit * limit / (limit + squared);
+  // The same; near 0 the one has more digits, far from it the other one's slope.
+  return select(value_of(squared) <= static_cast<std::decay_t<decltype(value_of(squared))>>(limit), near, far);
 }
 
 /// The kernel of r², by the scale s; r² of none.

@@ -444,7 +444,9 @@ void FrameGraph<S>::give_motion_after(std::span<const SceneState> frames) {
       const std::vector<double> joints = pose_skeleton(clip_.person(p).avatar, state.person(p)).joints;
       rows.insert(rows.end(), joints.begin(), joints.begin() + 3 * kMetricJoints);
     }
-    inputs_of(p).joints_after = constant_rows(tape_, "joints_after", rows, 3 * kMetricJoints);
+    LossInputs<S>& inputs = inputs_of(p);
+    inputs.joints_after = constant_rows(tape_, "joints_after", rows, 3 * kMetricJoints);
+    inputs.motion = with_objects_after(*inputs.motion, frames);
   }
 }
 

@@ -111,7 +111,8 @@ class FrameGraph {
   /// @param frames  the states before this frame that such terms see, and last the one that was set
   /// @param index   in the clip, of the first of these
   void give_motion(const SceneState& first, const std::vector<SceneState>& frames, Index index = 0);
-  /// Makes joints_after of the frames that follow, where the stages before left them. After give_motion, once.
+  /// Makes joints_after of the frames that follow, where the stages before left them, and tells where the objects are
+  /// in these. After give_motion, once.
   void give_motion_after(std::span<const SceneState> frames);
   /// Records points that tracks follow, and where these are in the frame. After give_motion, once.
   /// @param points  some at least

@@ -27,6 +27,9 @@ template <class S>
 void give_motion(const MovingFrames<S>& moving, const Clip& clip, std::size_t person, const SceneState& first,
                  const std::vector<SceneState>& frames, Index index, LossInputs<S>& inputs);
 
+/// The motion, with the objects of frames that follow.
+std::shared_ptr<const MotionStart> with_objects_after(const MotionStart& motion, std::span<const SceneState> frames);
+
 extern template void give_motion(const MovingFrames<float>&, const Clip&, std::size_t, const SceneState&,
                                  const std::vector<SceneState>&, Index, LossInputs<float>&);
 extern template void give_motion(const MovingFrames<double>&, const Clip&, std::size_t, const SceneState&,

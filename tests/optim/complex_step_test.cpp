@@ -293,6 +293,38 @@ TEST_CASE("contact has the gradients of complex steps, of vertices and of Gaussi
       {.loss = "contact"});
 }
 
+TEST_CASE("grip has the gradients of complex steps") {
+  const MotionStart& motion = motion_of_test().start;
+  check_complex_step(
+      {{"joints", shape_of(kFrames, 66)}, {"object_places", shape_of(kMoving * 2 * kObjectRows, 3)}},
+      [](const Vars& in) {
+        Inputs given;
+        given.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
+        given.joints = in[0];
+        given.object_points = object_points_of(in[1]);
+        return record_term("grip", given, R"({"scale": 0.5})");
+      },
+      [&motion](const ComplexInputs& in) {
+        Complex total = 0;
+        for (Index t = kStill - 1; t + 1 < kFrames; ++t) {
+          for (const Index wrist : kWristJoints) {  // both are at the first object, which does not turn
+            Complex squared = 0;
+            for (Index i = 0; i < 3; ++i) {
+              const auto joint = [&](Index frame) {
+                return in[0][static_cast<std::size_t>(66 * frame + 3 * wrist + i)];
+              };
+              const double start = motion.body_in(t).joints[static_cast<std::size_t>(3 * wrist + i)];
+              const Complex carried = in[1][3 * object_row({t + 1, 0, 0}) + static_cast<std::size_t>(i)];
+              squared += square(joint(t + 1) - carried - (joint(t) - start));
+            }
+            total += 0.25 * squared / (0.25 + squared);
+          }
+        }
+        return Complexes{total / static_cast<double>(kMoving)};
+      },
+      {.loss = "grip"});
+}
+
 TEST_CASE("a loss term of the objects' motion has the gradients of complex steps") {
   const MotionStart& motion = motion_of_test().start;
   std::vector<std::pair<Index, Index>> furthest;  // object, row

@@ -97,7 +97,7 @@ TEST_CASE("a loss that cannot be prepared is told with its place, unless it is o
 TEST_CASE("losses that need what a stage does not have are named, unless they are off") {
   StageSettings stage;
   for (const char* name :
-       {"photometric", "masked_l2", "center", "depth", "mask", "fit", "contact", "annotated_contact", "smooth",
+       {"photometric", "masked_l2", "center", "depth", "mask", "fit", "contact", "annotated_contact", "grip", "smooth",
         "object_smooth", "ground", "foot_sliding", "penetration", "joint_limits", "pose_prior"})
     stage.losses.emplace_back(name, default_settings(term_named(name).description));
   std::string text;
@@ -110,6 +110,7 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
         "/losses/fit: this loss needs the body, which a picture does not have\n"
         "/losses/contact: this loss needs the body, which a picture does not have\n"
         "/losses/annotated_contact: this loss needs the body, which a picture does not have\n"
+        "/losses/grip: this loss needs the body, which a picture does not have\n"
         "/losses/smooth: this loss needs the body, which a picture does not have\n"
         "/losses/object_smooth: this loss needs the body, which a picture does not have\n"
         "/losses/ground: this loss needs the body, which a picture does not have\n"

@@ -1,10 +1,12 @@
 // The loss terms that look at the motion over several frames.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <set>
 
 #include "core/parallel.h"
+#include "core/rotation.h"
 #include "core/text.h"
 #include "tests/support/loss_terms.h"
 #include "tests/support/operator_check.h"
@@ -115,6 +117,36 @@ TEST_CASE("object_smooth is the mean square of the differences of what lies furt
   CHECK(loss_of(R"({"order": 3})", kick) == Approx((0.01 + 0.09) / 2).epsilon(1e-6));
 }
 
+TEST_CASE("object_smooth sees the objects in frames that follow") {
+  // The object goes 1 cm a frame and stops: the step from the last frame that moves is 0, then it is 3 cm.
+  MotionOfTest test;
+  const auto loss_of = [&](int after, const std::string& settings) {
+    test.start.world_from_object.resize(kFrames);
+    for (int k = 0; k < after; ++k) {
+      test.start.world_from_object.push_back(test.start.world_from_object[kFrames - 1]);
+      test.start.world_from_object.back()[0].translation[0] += k == 0 ? 0 : 0.03;
+    }
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&test.start, [](const MotionStart*) {});
+    inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+      const Var<double> var = tape.parameter("object", shape_of(std::ssize(points), 3));
+      for (Index i = 0; i < std::ssize(points); ++i)
+        std::copy_n(test.start.place(points[static_cast<std::size_t>(i)]).data(), 3, tape.write(var).row(i));
+      return var;
+    };
+    const Var<double> loss = record_term("object_smooth", inputs, settings);
+    tape.forward(loss);
+    return tape.value(loss).scalar();
+  };
+  // Of two objects one moves. Changes of steps: none; with frames that follow −1 cm, then 3 cm, of 4 and of 5.
+  CHECK(loss_of(0, "{}") < 1e-15);
+  CHECK(loss_of(1, "{}") == Approx(1e-4 / 2 / 4).epsilon(1e-6));
+  CHECK(loss_of(2, "{}") == Approx((1e-4 + 9e-4) / 2 / 5).epsilon(1e-6));
+  CHECK(loss_of(3, "{}") == Approx((1e-4 + 9e-4) / 2 / 5).epsilon(1e-6));  // no further than differences reach
+  CHECK(loss_of(2, R"({"order": 1})") == Approx(3e-4 / 2 / 4).epsilon(1e-6));
+}
+
 TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain search") {
   const MotionOfTest& test = motion_of_test();
   const bool of_vertices = GENERATE(false, true);
@@ -145,6 +177,58 @@ TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain 
         motion_loss("contact", settings, no_joint, [&](const BodyPoint& p) { return test.start.place(p); });
     CHECK(loss == Approx(expected).epsilon(1e-12));
   }
+}
+
+TEST_CASE("grip is how far wrists move on what they hold, as the object carries and turns them") {
+  // Wrists go along a screw, and what they hold turns with it; the right one slips by 2 cm in frame 3 and stays there.
+  MotionOfTest test;
+  const auto screw = [](Index t) {
+    const double at = static_cast<double>(t);
+    return Rigid<double>{so3_exp(Vector3<double>(0.1 * at, -0.2 * at, 0.3 * at)), {0.05 * at, 0.02 * at, 0}};
+  };
+  std::array<Vector3<double>, 2> held = {Vector3<double>(0.02, 0.01, 0), Vector3<double>(-0.01, 0, 0.02)};
+  const auto wrist_at = [&](Index t, std::size_t hand, bool slips) -> Vector3<double> {
+    const Vector3<double> slip(0, slips && hand == 1 && t >= 3 ? 0.02 : 0, 0);
+    return transform_point(screw(t), Vector3<double>(held[hand] + slip));
+  };
+  for (Index t = 0; t < kFrames; ++t) {
+    const auto frame = static_cast<std::size_t>(t);
+    test.start.world_from_object[frame][0] = screw(t);
+    PosedJoints& body = test.start.body[frame];
+    std::fill(body.joints.begin(), body.joints.end(), 9);  // nothing else is near
+    for (std::size_t hand = 0; hand < 2; ++hand)
+      std::copy_n(wrist_at(t, hand, false).data(), 3, body.joints.begin() + 3 * kWristJoints[hand]);
+  }
+  const auto loss_of = [&](const std::string& settings, bool slips) {
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&test.start, [](const MotionStart*) {});
+    inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+    for (Index t = 0; t < kFrames; ++t) {
+      for (std::size_t hand = 0; hand < 2; ++hand)
+        std::copy_n(wrist_at(t, hand, slips).data(), 3, tape.write(inputs.joints).row(t) + 3 * kWristJoints[hand]);
+    }
+    inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+      const Var<double> var = tape.parameter("object", shape_of(std::ssize(points), 3));
+      for (Index i = 0; i < std::ssize(points); ++i)
+        std::copy_n(test.start.place(points[static_cast<std::size_t>(i)]).data(), 3, tape.write(var).row(i));
+      return var;
+    };
+    const Var<double> loss = record_term("grip", inputs, settings);
+    tape.forward(loss);
+    return tape.value(loss).scalar();
+  };
+  CHECK(loss_of("{}", false) < 1e-15);
+  constexpr double kSlip2 = 4e-4, kScale2 = 9e-4;
+  CHECK(loss_of("{}", true) == Approx(kScale2 * kSlip2 / (kScale2 + kSlip2) / 3).epsilon(1e-5));
+  CHECK(loss_of(R"({"scale": 10})", true) == Approx(kSlip2 / 3).epsilon(1e-4));
+  // The left hand holds nothing once it is off in both frames; the right one does where it is near in one of two.
+  for (std::size_t t = 0; t < kFrames; ++t) {
+    test.start.body[t].joints[static_cast<std::size_t>(3 * kWristJoints[0])] += 1;
+    if (t >= 3) test.start.body[t].joints[static_cast<std::size_t>(3 * kWristJoints[1])] += 1;
+  }
+  CHECK(loss_of(R"({"scale": 10})", true) == Approx(kSlip2 / 3).epsilon(1e-4));
+  CHECK(loss_of(R"({"distance": 0.001})", true) == 0);
 }
 
 TEST_CASE("annotated_contact draws parts of the body to what they are said to touch, by plain search") {

@@ -292,6 +292,10 @@ TEST_CASE("each person has its own sigmas, and its own places in the frames that
     const SceneState& last = states.back();
     const std::vector<double> joints = pose_skeleton(clip.person(p).avatar, last.person(p)).joints;
     for (Index i = 0; i < after.shape.cols; ++i) CHECK(after(1, i) == joints[static_cast<std::size_t>(i)]);
+    REQUIRE(inputs.motion->frames_with_objects() == inputs.motion->frames() + 2);
+    const auto& objects = inputs.motion->world_from_object.back();
+    REQUIRE(objects.size() == last.objects.size());
+    for (std::size_t o = 0; o < objects.size(); ++o) CHECK(objects[o].translation == last.objects[o].translation);
   }
 }
 
