@@ -10,6 +10,7 @@
 #include "core/rigid.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
+#include "optim/motion_start.h"
 #include "optim/object_centres.h"
 #include "pipelines/graph/frame_masks.h"
 
@@ -19,7 +20,6 @@ namespace {
 
 using Vector = Vector3<double>;
 
-constexpr std::array<Index, 2> kWrists = {20, 21};
 constexpr Index kChest = 9;
 constexpr std::size_t kFramesOfCarrier = 8;  // that tell it
 constexpr double kHandShift = 0.01;          // metres that a hand may shift what it holds
@@ -57,22 +57,13 @@ double spread_with(const Clip& clip, const Carrier& carrier, std::size_t object,
   return spread_of(places);
 }
 
-/// The wrist that a joint of a hand belongs to; none: it is no hand's.
-std::optional<Index> wrist_of(const Avatar& avatar, Index joint) {
-  while (joint >= 0) {
-    if (std::find(kWrists.begin(), kWrists.end(), joint) != kWrists.end()) return joint;
-    joint = avatar.parents[static_cast<std::size_t>(joint)];
-  }
-  return {};
-}
-
 bool is_touched(const Clip& clip, std::size_t object, std::size_t person, const SceneState& state) {
   const Avatar& avatar = clip.person(person).avatar;
   const ObjectCentres centres({&clip.objects[object].gaussians});
   const std::array<Rigid<double>, 1> pose = {rigid_of(state.objects[object])};
   const std::vector<double> joints = pose_joints(avatar, state.person(person));
   for (Index j = 0; 3 * j < std::ssize(joints); ++j) {
-    if (wrist_of(avatar, j) && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance)) return true;
+    if (is_hand_joint(j) && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance)) return true;
   }
   return false;
 }

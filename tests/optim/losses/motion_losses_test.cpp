@@ -51,6 +51,17 @@ double motion_loss(const std::string& name, const std::string& settings,
 
 double no_joint(Index, Index) { return 0; }
 
+/// Points of objects, a leaf each time, where they were when the stage began.
+std::function<Var<double>(const std::vector<ObjectPoint>&)> points_at_start(Tape<double>& tape,
+                                                                            const MotionStart& start) {
+  return [&tape, &start](const std::vector<ObjectPoint>& points) {
+    const Var<double> var = tape.parameter("object", shape_of(std::ssize(points), 3));
+    for (Index i = 0; i < std::ssize(points); ++i)
+      std::copy_n(start.place(points[static_cast<std::size_t>(i)]).data(), 3, tape.write(var).row(i));
+    return var;
+  };
+}
+
 }  // namespace
 
 TEST_CASE("fit is the mean over the moving frames of the squared distances of 22 joints") {
@@ -129,12 +140,7 @@ TEST_CASE("object_smooth sees the objects in frames that follow") {
     Tape<double> tape;
     LossInputs<double> inputs;
     inputs.motion = std::shared_ptr<const MotionStart>(&test.start, [](const MotionStart*) {});
-    inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
-      const Var<double> var = tape.parameter("object", shape_of(std::ssize(points), 3));
-      for (Index i = 0; i < std::ssize(points); ++i)
-        std::copy_n(test.start.place(points[static_cast<std::size_t>(i)]).data(), 3, tape.write(var).row(i));
-      return var;
-    };
+    inputs.object_points = points_at_start(tape, test.start);
     const Var<double> loss = record_term("object_smooth", inputs, settings);
     tape.forward(loss);
     return tape.value(loss).scalar();
@@ -208,12 +214,7 @@ TEST_CASE("grip is how far wrists move on what they hold, as the object carries 
       for (std::size_t hand = 0; hand < 2; ++hand)
         std::copy_n(wrist_at(t, hand, slips).data(), 3, tape.write(inputs.joints).row(t) + 3 * kWristJoints[hand]);
     }
-    inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
-      const Var<double> var = tape.parameter("object", shape_of(std::ssize(points), 3));
-      for (Index i = 0; i < std::ssize(points); ++i)
-        std::copy_n(test.start.place(points[static_cast<std::size_t>(i)]).data(), 3, tape.write(var).row(i));
-      return var;
-    };
+    inputs.object_points = points_at_start(tape, test.start);
     const Var<double> loss = record_term("grip", inputs, settings);
     tape.forward(loss);
     return tape.value(loss).scalar();
