@@ -128,8 +128,7 @@ FirstTouch first_touch(const MotionInScene& in, const Exported& out) {
   for (const Gaussians& object : in.objects) objects.push_back(&object);
   const ObjectCentres centres(objects);
   for (std::size_t t = 0; t < out.joints.size(); ++t) {
-    std::vector<Rigid<double>> poses;
-    for (const ObjectPose& pose : out.states[t].objects) poses.push_back({so3_exp(pose.rotation), pose.translation});
+    const std::vector<Rigid<double>> poses = rigids_of(out.states[t].objects);
     for (const char* const side : {"left", "right"}) {
       const std::string name = side;
       for (const std::string& joint : {name + "_wrist", name + "_index1", name + "_middle1"}) {

@@ -359,10 +359,7 @@ void measure_objects(const std::vector<std::string>& folders, const std::vector<
   m.result.notes.push_back("penetration of objects by " + joined(sources));
   std::vector<Penetration> counts;
   for (std::size_t t = 0; t < points.size(); ++t) {
-    std::vector<Rigid<double>> poses;
-    for (const ObjectPose& pose : m.tracks.states[t].objects)
-      poses.push_back({so3_exp(pose.rotation), pose.translation});
-    counts.push_back(penetration_of(distances, poses, points[t]));
+    counts.push_back(penetration_of(distances, rigids_of(m.tracks.states[t].objects), points[t]));
   }
   add_penetration(counts, object_penetration_values, m.result);
 }

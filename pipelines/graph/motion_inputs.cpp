@@ -29,12 +29,6 @@ std::vector<AnnotatedContact> contacts_of(const std::vector<AnnotatedContact>& a
   return contacts;
 }
 
-std::vector<Rigid<double>> poses_of(const std::vector<ObjectPose>& objects) {
-  std::vector<Rigid<double>> poses;
-  for (const ObjectPose& pose : objects) poses.push_back({so3_exp(pose.rotation), pose.translation});
-  return poses;
-}
-
 /// Contacts are annotated of the first person.
 std::shared_ptr<const MotionStart> start_of(const Clip& clip, std::size_t person, const SceneState& first,
                                             const std::vector<SceneState>& frames, Index index, Index moving) {
@@ -51,7 +45,7 @@ std::shared_ptr<const MotionStart> start_of(const Clip& clip, std::size_t person
   start->first_body = pose_skeleton(who.avatar, first.person(person));
   for (const SceneState& frame : frames) {
     start->body.push_back(pose_skeleton(who.avatar, frame.person(person)));
-    start->world_from_object.push_back(poses_of(frame.objects));
+    start->world_from_object.push_back(rigids_of(frame.objects));
   }
   if (clip.contacts && person == 0) start->contacts = contacts_of(*clip.contacts, index, *start);
   return start;
@@ -184,7 +178,7 @@ void give_motion(const MovingFrames<S>& moving, const Clip& clip, std::size_t pe
 
 std::shared_ptr<const MotionStart> with_objects_after(const MotionStart& motion, std::span<const SceneState> frames) {
   auto all = std::make_shared<MotionStart>(motion);
-  for (const SceneState& frame : frames) all->world_from_object.push_back(poses_of(frame.objects));
+  for (const SceneState& frame : frames) all->world_from_object.push_back(rigids_of(frame.objects));
   return all;
 }
 

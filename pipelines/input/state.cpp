@@ -41,6 +41,12 @@ std::vector<double> read_track(const Npz& npz, const std::string& name, std::int
 
 Rigid<double> rigid_of(const ObjectPose& pose) { return {so3_exp(pose.rotation), pose.translation}; }
 
+std::vector<Rigid<double>> rigids_of(const std::vector<ObjectPose>& poses) {
+  std::vector<Rigid<double>> rigids;
+  for (const ObjectPose& pose : poses) rigids.push_back(rigid_of(pose));
+  return rigids;
+}
+
 ObjectPose pose_of(const Rigid<double>& world_from_object) {
   return {so3_log(world_from_object.rotation), world_from_object.translation};
 }

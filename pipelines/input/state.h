@@ -18,6 +18,7 @@ struct ObjectPose {
 
 /// world_from_object.
 Rigid<double> rigid_of(const ObjectPose& pose);
+std::vector<Rigid<double>> rigids_of(const std::vector<ObjectPose>& poses);
 /// The pose of it, the angle up to π.
 ObjectPose pose_of(const Rigid<double>& world_from_object);
 

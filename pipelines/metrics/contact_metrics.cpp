@@ -21,12 +21,6 @@ namespace {
 constexpr Index kPointGrain = 64;
 constexpr double kApart = -1;  // in place of a distance
 
-std::vector<Rigid<double>> poses_of(const SceneState& state) {
-  std::vector<Rigid<double>> poses;
-  for (const ObjectPose& pose : state.objects) poses.push_back({so3_exp(pose.rotation), pose.translation});
-  return poses;
-}
-
 bool is_a_hand_joint_near(std::span<const double> joints, const ObjectCentres& centres,
                           std::span<const Rigid<double>> world_from_object) {
   for (Index j = 0; j < std::ssize(joints) / 3; ++j) {
@@ -74,7 +68,7 @@ std::vector<MetricValues> contact_by_frame(const Avatar& avatar, const std::vect
     MotionStart motion;
     motion.avatar = &avatar;
     motion.first_body = pose_skeleton(avatar, states[t].body);
-    const std::vector<Rigid<double>> poses = poses_of(states[t]);
+    const std::vector<Rigid<double>> poses = rigids_of(states[t].objects);
     by_frame[t].emplace_back("contact_share", is_a_hand_joint_near(motion.first_body.joints, centres, poses) ? 1 : 0);
     double sum = 0;
     Index count = 0;
@@ -96,7 +90,8 @@ std::vector<MetricValues> contact_share_by_frame(const std::vector<std::vector<d
   if (objects.empty()) return by_frame;
   const ObjectCentres centres(objects);
   for (std::size_t t = 0; t < states.size(); ++t)
-    by_frame[t].emplace_back("contact_share", is_a_hand_joint_near(joints[t], centres, poses_of(states[t])) ? 1 : 0);
+    by_frame[t].emplace_back("contact_share",
+                             is_a_hand_joint_near(joints[t], centres, rigids_of(states[t].objects)) ? 1 : 0);
   return by_frame;
 }
 

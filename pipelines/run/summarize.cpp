@@ -164,9 +164,8 @@ class ObjectPenetration {
   std::vector<Penetration> by_frame(const std::vector<SceneState>& states) const {
     std::vector<Penetration> counts;
     for (std::size_t t = 0; is_known_ && t < states.size(); ++t) {
-      std::vector<Rigid<double>> poses;
-      for (const ObjectPose& pose : states[t].objects) poses.push_back({so3_exp(pose.rotation), pose.translation});
-      counts.push_back(penetration_of(distances_, poses, measured_points(clip_.avatar, states[t].body)));
+      counts.push_back(
+          penetration_of(distances_, rigids_of(states[t].objects), measured_points(clip_.avatar, states[t].body)));
     }
     return counts;
   }
@@ -305,9 +304,7 @@ FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw) {
   frame.camera_from_world = state.camera_from_world;
   if (draw == Draw::kScene) return frame;
   frame.joints = pose_joints(avatar, state.body);
-  for (const ObjectPose& pose : state.objects) {
-    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
-  }
+  frame.world_from_object = rigids_of(state.objects);
   return frame;
 }
 
