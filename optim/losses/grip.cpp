@@ -7,7 +7,8 @@
 //
 //   w_{t+1} − A_t w_t = w_{t+1} − p − R_t (w_t − w_t⁰)
 //
-// in which R⁰ stands for R: exact where frame t or the object stands still, one of which does in every stage.
+// in which R⁰ stands for R: exact where frame t or the object stands still, one of which does in every stage. Which
+// hands hold what, and R⁰, have no gradient.
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -40,13 +41,13 @@ void describe(ConfigFields& fields, GripSettings& settings) {
                 "A hand that moves farther than this on the object between two frames is hardly pulled, metres");
 }
 
-/// The object that each hand is near to, by frame; none: −1.
+/// The object that each hand is near to, by frame from the first one on; none: −1.
 using Touched = std::vector<std::array<Index, kWristJoints.size()>>;
 
-Touched touched_objects(const MotionStart& motion, double distance) {
+Touched touched_objects(const MotionStart& motion, Index first, double distance) {
   const ObjectCentres centres(motion.objects);
   Touched touched;
-  for (Index t = 0; t < motion.frames(); ++t) {
+  for (Index t = first; t < motion.frames(); ++t) {
     auto& objects = touched.emplace_back();
     objects.fill(-1);
     std::array<double, kWristJoints.size()> within;
@@ -88,14 +89,13 @@ void add_grip(const MotionStart& motion, Index frame, Index joint, Index object,
 }
 
 Grips grips_of(const MotionStart& motion, double distance) {
-  const Touched touched = touched_objects(motion, distance);
+  const Index first = std::max<Index>(0, motion.still_frames - 1);  // that is followed by one that moves
+  const Touched touched = touched_objects(motion, first, distance);
   Grips grips;
-  for (Index t = std::max<Index>(0, motion.still_frames - 1); t + 1 < motion.frames(); ++t) {
+  for (std::size_t i = 0; i + 1 < touched.size(); ++i) {
     for (std::size_t hand = 0; hand < kWristJoints.size(); ++hand) {
-      const Index before = touched[static_cast<std::size_t>(t)][hand],
-                  after = touched[static_cast<std::size_t>(t + 1)][hand];
-      const Index object = before >= 0 ? before : after;
-      if (object >= 0) add_grip(motion, t, kWristJoints[hand], object, grips);
+      const Index object = touched[i][hand] >= 0 ? touched[i][hand] : touched[i + 1][hand];
+      if (object >= 0) add_grip(motion, first + static_cast<Index>(i), kWristJoints[hand], object, grips);
     }
   }
   return grips;

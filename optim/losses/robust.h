@@ -45,9 +45,10 @@ T huber(T squared, float scale) {
 /// @param limit  s²
 template <class T>
 T geman_mcclure(T squared, float limit) {
-  const T near = limit * squared / (limit + squared), far = limit - limit * limit / (limit + squared);
-  // The same; near 0 the one has more digits, far from it the other one's slope.
-  return select(value_of(squared) <= static_cast<std::decay_t<decltype(value_of(squared))>>(limit), near, far);
+  const T share = limit / (limit + squared);  // of r² that counts
+  const bool is_near = value_of(squared) <= static_cast<std::decay_t<decltype(value_of(squared))>>(limit);
+  // Equal forms: in float the first loses the slope far from 0, the second the value near it.
+  return select(is_near, squared * share, limit * (1.0F - share));
 }
 
 /// The kernel of r², by the scale s; r² of none.
