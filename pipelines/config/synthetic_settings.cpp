@@ -74,6 +74,7 @@ const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion) {
   static const std::vector<Object> none = {Object::kNone};
   switch (motion) {
     case SyntheticMotionKind::kPour:
+    case SyntheticMotionKind::kPutDown:
       return on_table;
     case SyntheticMotionKind::kLift:
       return lifted;

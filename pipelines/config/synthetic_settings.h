@@ -80,6 +80,7 @@ inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 10> kSyntheticObj
 enum class SyntheticMotionKind {
   kPour,
   kLift,
+  kPutDown,
   kWalk,
   kPush,
   kSit,
@@ -97,9 +98,10 @@ enum class SyntheticMotionKind {
   kOpen
 };
 
-inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 17> kSyntheticMotionKinds = {
+inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 18> kSyntheticMotionKinds = {
     {{SyntheticMotionKind::kPour, "pour"},
      {SyntheticMotionKind::kLift, "lift"},
+     {SyntheticMotionKind::kPutDown, "put_down"},
      {SyntheticMotionKind::kWalk, "walk"},
      {SyntheticMotionKind::kPush, "push"},
      {SyntheticMotionKind::kSit, "sit"},

@@ -1,4 +1,4 @@
-// Motions on the spot, from keyframes: pour, lift, sit, lean, wave, open.
+// Motions on the spot, from keyframes: pour, lift, put_down, sit, lean, wave, open.
 //
 // Before an effort there is a key that goes the other way
 // (the knees give before something is lifted, the trunk leans forward before one sits).
@@ -61,6 +61,29 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
               {-10, 0, 26 + 54 * across}, 64, {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}),
       holding(kClipSeconds, {0.03, -0.03, -0.025}, {1, 12, 1}, {-3, 15, -1}, {-2, 6, 0}, {left + 0.1, 0.38, high},
               {6, 0, 20 + 56 * across}, 64, {{0.05, 0.02, 0.02}, {0, 0, 0}, 26})};
+  return motion;
+}
+
+/// From before the chest to a table and out of the hands.
+KeyedMotion put_down_motion(bool two_hands) {
+  const double left = two_hands ? 0.0 : -0.1, across = two_hands ? 0.0 : 40.0;
+  const Vector there(left, 0.52, 0.92), there_turn(0, 0, across);
+  KeyedMotion motion;
+  motion.ground = kBesideTable;
+  motion.feet = {planted_foot(0.15, 0.06, 12), planted_foot(-0.15, -0.05, -14)};
+  const HandKey beside = {{0.05, 0.03, 0.02}, {0, 0, 0}, 26}, ahead = {{0.05, 0.12, 0.06}, {0, 0, 0}, 24};
+  motion.keys = {
+      holding(0, {0.03, -0.03, -0.025}, {1, 6, 1}, {-3, 8, -1}, {-2, 4, 0}, {left + 0.05, 0.38, 1.3},
+              {3, 0, 8 + 1.6 * across}, 64, beside),
+      holding(0.9, {0.02, -0.04, -0.03}, {2, 2, 0}, {0, 2, -2}, {12, 2, 0}, {0.8 * left, 0.4, 1.16},
+              {-4, 0, 4 + across}, 64, beside),
+      holding(1.6, {-0.02, 0.05, -0.1}, {13, -6, 0}, {23, -9, 2}, {12, -6, 0}, there, there_turn, 60, ahead),
+      // the fingers open before the hands leave
+      holding(1.85, {-0.02, 0.05, -0.1}, {13, -6, 0}, {23, -9, 2}, {12, -6, 0}, there, there_turn, 26, ahead),
+      holding(2.5, {0, -0.02, -0.03}, {3, -2, 0}, {5, -3, 1}, {8, -2, 0}, there, there_turn, 18, beside, {},
+              {0, -0.2, 0.12}),
+      holding(kClipSeconds, {0.01, -0.03, -0.02}, {0, 0, 0}, {0, 0, 0}, {2, 4, 0}, there, there_turn, 20, beside, {},
+              {0, -0.24, 0.14})};
   return motion;
 }
 
@@ -205,6 +228,8 @@ KeyedMotion motion_of(const Actor& actor) {
       const bool two_hands = object.hands[kLeft] && object.hands[kRight];
       return lift_motion(object.on_floor ? ground_to_grip + 0.03 : 0.92, two_hands);
     }
+    case SyntheticMotionKind::kPutDown:
+      return put_down_motion(object.hands[kLeft] && object.hands[kRight]);
     case SyntheticMotionKind::kSit:
       return sit_motion(kChairSeat + 0.085 - actor.sizes.standing, ground_to_grip);
     case SyntheticMotionKind::kLean:
@@ -230,7 +255,8 @@ Moment keyed_moment(const Actor& actor, double seconds) {
   figure = keyed_figure(actor, motion, key);
   for (const int side : {kLeft, kRight}) {
     const auto i = static_cast<std::size_t>(side);
-    if (actor.motion == SyntheticMotionKind::kLift && actor.object.hands[i])
+    const bool reaches = actor.motion == SyntheticMotionKind::kLift || actor.motion == SyntheticMotionKind::kPutDown;
+    if (reaches && actor.object.hands[i])
       figure.hands[i].elbow = ground.direction({side == kLeft ? 0.9 : -0.9, -0.2, -0.3});
   }
   if (actor.motion == SyntheticMotionKind::kWave) wave_hand(actor, ground, t, figure.hands[kLeft]);

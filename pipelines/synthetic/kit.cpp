@@ -217,6 +217,11 @@ void SceneKit::add_table() {
   }
 }
 
+void SceneKit::add_screen() {
+  const Point half(0.27, 0.02, 0.2);
+  board(plan.support + Point(0.03, -0.2, half.z()), half, Rgb(0.36, 0.43, 0.5), 2, 0);
+}
+
 void SceneKit::add_stand() {
   const Matrix3<double> axes = so3_exp(Point(0, 0, plan.support_turn));
   const auto at = [&](double left, double forward, double up) {
@@ -244,6 +249,7 @@ void SceneKit::add_posts() {
 
 void SceneKit::add_support() {
   if (plan.has_table) add_table();
+  if (plan.has_screen) add_screen();
   if (plan.has_stand) add_stand();
   if (plan.has_posts) add_posts();
 }

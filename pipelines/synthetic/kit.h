@@ -77,6 +77,7 @@ class SceneKit {
 
  private:
   void add_table();
+  void add_screen();
   void add_stand();
   void add_posts();
 

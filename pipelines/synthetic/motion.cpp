@@ -45,13 +45,18 @@ Rigid<double> wrist_from_object(const Actor& actor, const Ground& ground) {
   return result;
 }
 
-/// What has to stand where for the object to be where it begins.
+/// When a clip's object is on what it stands on.
+double standing_at(SyntheticMotionKind motion) { return motion == SyntheticMotionKind::kPutDown ? kClipSeconds : 0; }
+
+/// What has to stand where for the object to stand there.
+/// @param first  the moment of standing_at
 ScenePlan plan_of(const Moment& first, const SyntheticObject& object, SyntheticMotionKind motion) {
   ScenePlan plan;
   plan.middle = is_walking(motion) ? Vector2<double>(0, 0.6) : first.figure.ground.place;
   plan.seen_from_y = is_walking(motion) ? -1.4 : 0.2;
-  const bool stands =
-      motion == SyntheticMotionKind::kPour || (motion == SyntheticMotionKind::kLift && !object.is_heavy);
+  plan.has_screen = motion == SyntheticMotionKind::kPutDown;
+  const bool stands = motion == SyntheticMotionKind::kPour || plan.has_screen ||
+                      (motion == SyntheticMotionKind::kLift && !object.is_heavy);
   plan.has_table = stands && !object.on_floor;
   plan.has_stand = stands && object.on_floor;
   if (object.hinge) {
@@ -289,8 +294,8 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
     if (place) clip.object.push_back(*place);
     clip.cameras.push_back(camera_at(first_viewpoint(settings), seconds, settings));
   }
-  Moment first = moment_at(actor, 0);
-  if (first.object) first.object = state_at(0).object;
+  Moment first = moment_at(actor, standing_at(settings.motion));
+  if (first.object) first.object = state_at(standing_at(settings.motion)).object;
   clip.plan = plan_of(first, object, settings.motion);
   if (settings.place != nullptr) {
     clip.plan.place = settings.place;
@@ -321,6 +326,8 @@ const char* motion_summary(SyntheticMotionKind motion) {
       return "lifts it from a table, turns and pours";
     case SyntheticMotionKind::kLift:
       return "reaches for it, takes it and holds it up";
+    case SyntheticMotionKind::kPutDown:
+      return "puts it down on a table behind a screen, lets go and takes it up again";
     case SyntheticMotionKind::kWalk:
       return "walks in a circle, carrying it";
     case SyntheticMotionKind::kPush:

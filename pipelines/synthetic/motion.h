@@ -1,8 +1,8 @@
 // What happens in a synthetic clip: a person does something with an object while the camera drifts. Everything is a
 // function of time; frames sample it.
 //
-// pour, lift, sit, lean, wave and open are keyframes (synthetic_keys.cpp): kClipSeconds long, then backwards, and
-// forwards again, for as many frames as are wanted. walk and push go around in a circle from footstep to footstep
+// pour, lift, put_down, sit, lean, wave and open are keyframes (synthetic_keys.cpp): kClipSeconds long, then backwards,
+// and forwards again, for as many frames as are wanted. walk and push go around in a circle from footstep to footstep
 // (synthetic_walk.cpp) and never end. sit_on, lean_on, reach, wipe and water are keyframes at a place of the scene
 // (synthetic_place_keys.cpp), run, slide, play and roll functions of time (synthetic_flow.cpp).
 //

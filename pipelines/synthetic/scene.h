@@ -15,6 +15,7 @@ struct ScenePlan {
   Vector3<double> support{-0.25, 0.35, 0.75};  ///< what the object stands on: middle of its upper side
   double support_turn = 0;                     ///< about z, radians
   bool has_table = true;                       ///< the support is a table
+  bool has_screen = false;                     ///< a board on the table, before the object as the camera sees it
   bool has_stand = false;                      ///< it is a stand on the floor
   bool has_posts = false;                      ///< it is the foot of the hinge of a gate between two posts
   Vector2<double> middle{0, 0.6};              ///< where the person acts

@@ -259,6 +259,7 @@ TEST_CASE("hands are at the object that they hold") {
     for (std::size_t t = 0; t < clip.object.size(); ++t) {
       const double seconds = double(t) / 15;
       if (motion == SyntheticMotionKind::kLift && seconds < 0.56) continue;  // it reaches for it
+      if (motion == SyntheticMotionKind::kPutDown && seconds > 1.85 && seconds < 4.15) continue;
       INFO("frame " << t);
       for (const std::size_t side : {0U, 1U}) {
         if (!object.hands[side]) continue;
@@ -268,6 +269,23 @@ TEST_CASE("hands are at the object that they hold") {
       }
     }
   });
+}
+
+TEST_CASE("what is put down stays on the table while the hands are away, and is taken up again") {
+  for (const SyntheticObjectKind kind : objects_of(SyntheticMotionKind::kPutDown)) {
+    const SyntheticObject object = synthetic_object(kind, 600, 0);
+    INFO(pair_name(SyntheticMotionKind::kPutDown, kind));
+    const SyntheticClip clip = synthetic_clip(body(), object, {61, 10, 64, 1, SyntheticMotionKind::kPutDown});
+    CHECK(clip.plan.has_screen);
+    for (std::size_t t = 19; t <= 41; ++t) CHECK(clip.object[t].translation == clip.object[30].translation);
+    const Vector foot = clip.object[30].translation - Vector(0, 0, object.above_ground);
+    CHECK(foot.z() == Approx(clip.plan.support.z()).margin(1e-9));
+    const int wrist = smplx_joint("right_wrist");
+    const Vector palm =
+        transform_point(joint_frame(body(), clip.motion.poses[30], wrist), figure_sizes(body()).palm[kRight]);
+    CHECK((palm - transform_point(clip.object[30], object.hands[kRight]->point)).norm() > 0.2);
+    for (const std::size_t t : {0U, 60U}) CHECK(clip.object[t].translation.z() > clip.object[30].translation.z() + 0.3);
+  }
 }
 
 TEST_CASE("joints stay within their ranges but for a few degrees") {
