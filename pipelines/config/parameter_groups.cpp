@@ -12,7 +12,8 @@ constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_
 std::vector<std::string> state_group_names(Draw draw) {
   std::vector<std::string> names = {"camera"};
   if (draw == Draw::kScene) return names;
-  names.insert(names.end(), {kObjectOrientGroup, kObjectTranslGroup, kObjectJointGroup, kTranslGroup});
+  names.insert(names.end(),
+               {kObjectOrientGroup, kObjectTranslGroup, kObjectJointGroup, kObjectLightGroup, kTranslGroup});
   for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
   names.insert(names.end(), {kColorNetGroup, kFeaturesGroup});
   return names;
@@ -36,6 +37,7 @@ std::string state_group_summary(const std::string& name) {
   if (name == kObjectOrientGroup) return "Rotations of the objects that move freely";
   if (name == kObjectTranslGroup) return "Places of the objects that move freely";
   if (name == kObjectJointGroup) return "How far objects have turned or slid on their joints";
+  if (name == kObjectLightGroup) return "Brightness of the objects: by channel, and by the direction of their surface";
   if (name == "transl") return "Place of the body";
   if (name == kColorNetGroup) return "Weights of the network that colours the human, which all frames share";
   if (name == kFeaturesGroup) return "That network's features of each Gaussian, which all frames share";

@@ -34,6 +34,8 @@ inline constexpr const char* kOrientGroup = "global_orient";
 inline constexpr const char* kObjectOrientGroup = "object_orient";
 inline constexpr const char* kObjectTranslGroup = "object_transl";
 inline constexpr const char* kObjectJointGroup = "object_joint";
+/// The group of the light on objects (pipelines/draw/object_light.h).
+inline constexpr const char* kObjectLightGroup = "object_light";
 /// The group of the latents of the pose prior, which stand for the joints.
 inline constexpr const char* kPoseLatents = "pose_latents";
 

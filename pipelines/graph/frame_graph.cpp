@@ -14,6 +14,7 @@
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
 #include "optim/metrics.h"
+#include "pipelines/draw/object_light.h"
 #include "pipelines/draw/tape_image.h"
 #include "pipelines/graph/camera_increment.h"
 #include "pipelines/graph/motion_inputs.h"
@@ -227,10 +228,18 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
     placed.rotation = placed.turn * exp(unknown_.object_scale.back());
     transform = rigid_rows(placed.rotation, placed.transl);
   }
-  objects_.push_back(placed);
-  const SplatInputs<S> splats = moved_splats(vars, in_scene(transform, kHeightOfTransform), turn, xi_, view_);
+  SplatInputs<S> splats = moved_splats(vars, in_scene(transform, kHeightOfTransform), turn, xi_, view_);
   hold_colors(splats.colors, {"object_sh"});
+  if (settings_.object_light) splats.colors = light_object(object, placed, splats.colors);
+  objects_.push_back(placed);
   return {splats, object.gaussians.count()};
+}
+
+/// The colours under a light, which is a leaf.
+template <class S>
+Var<S> FrameGraph<S>::light_object(const ClipObject& object, Object& placed, Var<S> colors) {
+  placed.light = leaf(kObjectLightGroup, object.name + " light", 1, 6, nullptr);
+  return lit_colors(colors, outward_normals(tape_, object.gaussians), placed.turn, placed.light);
 }
 
 template <class S>
@@ -586,6 +595,8 @@ void FrameGraph<S>::set_state(const SceneState& state) {
   if (settings_.draw == Draw::kScene) return;
   HSI4D_CHECK_EQ(state.objects.size(), objects_.size());
   for (std::size_t o = 0; o < objects_.size(); ++o) {
+    const ObjectLight light = state.lights.empty() ? ObjectLight{} : state.lights.at(o);
+    if (settings_.object_light) write_numbers(tape_, objects_[o].light, light.data());
     if (const std::optional<ObjectJoint>& joint = clip_.objects[o].joint) {
       const double q = joint_value(*joint, parent_from_object(*joint, state.objects, o));
       write_numbers(tape_, objects_[o].joint, &q);
@@ -615,6 +626,11 @@ void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, S
     for (Index i = 0; i < 6; ++i) update[i] = static_cast<double>(tape_.value(camera_update_)(0, i));
     const Vector6<double> xi = xi_from_update_ * update;
     state.camera_from_world = se3_update(xi, view_.camera.camera_from_world);
+  }
+  if (settings_.object_light && is_moved(kObjectLightGroup)) {
+    state.lights.resize(objects_.size());
+    for (std::size_t o = 0; o < objects_.size(); ++o)
+      std::copy_n(tape_.value(objects_[o].light).data, state.lights[o].size(), state.lights[o].data());
   }
   const bool is_parent_moved = is_moved(kObjectOrientGroup) || is_moved(kObjectTranslGroup);
   for (std::size_t o = 0; o < objects_.size(); ++o) {

@@ -40,6 +40,7 @@ struct FrameGraphSettings {
   std::span<const ColorNet> color_nets =
       {};                              ///< by person, read when the graph is recorded; empty: the avatars' colours
   bool color_camera_gradient = false;  ///< colours of the net have a gradient in the camera, by the direction of view
+  bool object_light = false;           ///< objects have a light, a leaf each
   bool human_opacity = false;          ///< the losses read the people's opacity, a channel of the render each
   bool object_opacity = false;         ///< likewise of the objects, a channel each
   bool keypoints = false;              ///< the losses read the clip's keypoints
@@ -138,6 +139,7 @@ class FrameGraph {
   struct Object {
     Var<S> orient, transl;  // leaves; of one on a joint transl is what that gives, and there is no orient
     Var<S> joint;           // [1,1] a leaf, of one on a joint
+    Var<S> light;           // [1,6] a leaf, with settings.object_light
     Var<S> turn;            // [1,9] the rotation
     Var<S> rotation;        // [1,9] the same, times the object's factor where that is unknown
   };
@@ -165,6 +167,7 @@ class FrameGraph {
   void record_moving(std::vector<Part>& parts);
   Part record_object(const ClipObject& object);
   Object free_object(const std::string& name);
+  Var<S> light_object(const ClipObject& object, Object& placed, Var<S> colors);
   Object object_on_joint(const std::string& name, const ObjectJoint& joint);
   Part record_human(std::size_t person, const Avatar& avatar);
   void record_skeleton(const Avatar& avatar, Human& human);

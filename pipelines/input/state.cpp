@@ -65,8 +65,14 @@ void write_object_tracks(const std::string& path, const std::vector<std::string>
   for (std::size_t o = 0; o < names.size(); ++o) {
     writer.add<double>(names[o] + "/rotation", {count, 3}, track(frames, o, &ObjectPose::rotation));
     writer.add<double>(names[o] + "/translation", {count, 3}, track(frames, o, &ObjectPose::translation));
-    if (sigmas.empty()) continue;
     std::vector<double> numbers;
+    for (const SceneState& frame : frames) {
+      const ObjectLight light = frame.lights.empty() ? ObjectLight{} : frame.lights.at(o);
+      numbers.insert(numbers.end(), light.begin(), light.end());
+    }
+    if (!frames.empty() && !frames.back().lights.empty()) writer.add<double>(names[o] + "/light", {count, 6}, numbers);
+    numbers.clear();
+    if (sigmas.empty()) continue;
     for (const PlaceSigmas& frame : sigmas) append(frame.objects.at(o), numbers);
     writer.add<double>(names[o] + "/sigma", {count, 2}, numbers);
   }

@@ -1,6 +1,7 @@
 // The state that is reconstructed, frame by frame, and its files.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -22,12 +23,17 @@ std::vector<Rigid<double>> rigids_of(const std::vector<ObjectPose>& poses);
 /// The pose of it, the angle up to π.
 ObjectPose pose_of(const Rigid<double>& world_from_object);
 
+/// Light on an object beside that of its file (pipelines/draw/object_light.h): logarithms of the factors of red, green
+/// and blue, then the vector l of a factor exp(n·l), n the normal in the world.
+using ObjectLight = std::array<double, 6>;
+
 /// Everything that moves, at one frame.
 struct SceneState {
   Rigid<double> camera_from_world;
-  std::vector<ObjectPose> objects;  ///< in the clip's order
-  BodyPose body;                    ///< of the clip's first person
-  std::vector<BodyPose> others{};   ///< of the people beside it, in the clip's order
+  std::vector<ObjectPose> objects;    ///< in the clip's order
+  BodyPose body;                      ///< of the clip's first person
+  std::vector<BodyPose> others{};     ///< of the people beside it, in the clip's order
+  std::vector<ObjectLight> lights{};  ///< of the objects, or empty: none
 
   std::size_t people() const { return 1 + others.size(); }
   BodyPose& person(std::size_t p) { return p == 0 ? body : others.at(p - 1); }
@@ -63,7 +69,8 @@ struct JointTrack {
 };
 
 /// Writes objects.npz: NAME/rotation [T,3] and NAME/translation [T,3], NAME/sigma [T,2] (across, along) where it is
-/// known, and NAME/joint [T] of objects on joints; float64.
+/// known, NAME/light [T,6] (ObjectLight) where the last frame has one, and NAME/joint [T] of objects on joints;
+/// float64.
 /// @param sigmas  by frame; empty: not known
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,
                          const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas = {},

@@ -118,7 +118,8 @@ std::vector<Entry> names_of(const Checkpoint& checkpoint, const char* key, const
   return entries;
 }
 
-/// One state as numbers: camera [R | t] (12), then 6 an object, then each body's transl (3) and axis-angles (165).
+/// One state as numbers: camera [R | t] (12), then 6 an object, then 6 of each light, then each body's transl (3) and
+/// axis-angles (165).
 void append(const SceneState& state, std::vector<double>& numbers) {
   for (Index r = 0; r < 3; ++r) {
     for (Index c = 0; c < 3; ++c) numbers.push_back(state.camera_from_world.rotation(r, c));
@@ -127,6 +128,10 @@ void append(const SceneState& state, std::vector<double>& numbers) {
   for (const ObjectPose& pose : state.objects) {
     numbers.insert(numbers.end(), pose.rotation.data(), pose.rotation.data() + 3);
     numbers.insert(numbers.end(), pose.translation.data(), pose.translation.data() + 3);
+  }
+  for (std::size_t o = 0; o < state.objects.size(); ++o) {
+    const ObjectLight light = state.lights.empty() ? ObjectLight{} : state.lights.at(o);
+    numbers.insert(numbers.end(), light.begin(), light.end());
   }
   for (std::size_t p = 0; p < state.people(); ++p) {
     const BodyPose& body = state.person(p);
@@ -149,7 +154,7 @@ void set_pixels(const std::vector<float>& pixels, Image& mask) {
 }
 
 Index numbers_per_state(const Clip& clip) {
-  return kRigidNumbers + 6 * std::ssize(clip.objects) + static_cast<Index>(clip.people()) * (3 + kPoseNumbers);
+  return kRigidNumbers + 12 * std::ssize(clip.objects) + static_cast<Index>(clip.people()) * (3 + kPoseNumbers);
 }
 
 SceneState state_from(const double* numbers, const Clip& clip) {
@@ -161,6 +166,10 @@ SceneState state_from(const double* numbers, const Clip& clip) {
   for (std::size_t o = 0; o < clip.objects.size(); ++o, numbers += 6) {
     state.objects.push_back({Vector3<double>(numbers), Vector3<double>(numbers + 3)});
   }
+  for (std::size_t o = 0; o < clip.objects.size(); ++o, numbers += 6)
+    std::copy_n(numbers, 6, state.lights.emplace_back().data());
+  if (std::all_of(state.lights.begin(), state.lights.end(), [](const ObjectLight& l) { return l == ObjectLight{}; }))
+    state.lights.clear();
   state.others.resize(clip.others.size());
   for (std::size_t p = 0; p < clip.people(); ++p, numbers += 3 + kPoseNumbers) {
     state.person(p).transl = Vector3<double>(numbers);

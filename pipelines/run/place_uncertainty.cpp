@@ -104,7 +104,7 @@ class Estimate {
     const std::vector<std::string> movable = state_group_names(Draw::kAll);
     for (const OptimizerGroup<S>& group : groups_) {
       const std::string& name = group.parameters.name;
-      const bool is_pose = name != kColorNetGroup && name != kFeaturesGroup &&
+      const bool is_pose = name != kColorNetGroup && name != kFeaturesGroup && name != kObjectLightGroup &&
                            std::find(movable.begin(), movable.end(), name) != movable.end();
       if (!is_pose) continue;
       set_frozen(tape, group.parameters, false);

@@ -390,6 +390,7 @@ class Reconstruction {
   void remove_bias() {
     const ClipFrame frame = read_frame(clip_, 0);
     SceneState fitted = clip_.first;
+    if (clip_.frames() > 1) fitted.lights = progress_.after_stage.back()[1].lights;  // as other frames begin with one
     ColorState colors = progress_.colors;
     for (std::size_t s = first_stages_; s < later_stage(); ++s) {
       if (!fits_what_moves(s)) continue;

@@ -15,6 +15,12 @@ namespace hsi4d {
 
 namespace {
 
+/// Whether a stage looks for the light on objects: then all are drawn with it.
+bool lights_objects(const RunConfig& config) {
+  return std::any_of(config.stages.begin(), config.stages.end(),
+                     [](const auto& entry) { return find_entry(entry.second.optimize, kObjectLightGroup) != nullptr; });
+}
+
 FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const ColorState& colors) {
   return {config.render,
           config.skip.render,
@@ -24,7 +30,8 @@ FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const Colo
           draw,
           Vector3<double>(config.background.data()),
           colors.nets,
-          config.color_net.camera_gradient};
+          config.color_net.camera_gradient,
+          lights_objects(config)};
 }
 
 /// Whether a term that is on needs an input which is made on demand.

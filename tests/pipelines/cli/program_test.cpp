@@ -123,7 +123,8 @@ TEST_CASE("check refuses stages whose groups are not known, do not exist in what
              "losses": {"photometric": {}}},
     "none": {"iterations": 5, "optimize": {}}}})");
   const std::string groups =
-      "camera, object_orient, object_transl, object_joint, transl, global_orient, body_pose, jaw_pose, leye_pose, "
+      "camera, object_orient, object_transl, object_joint, object_light, transl, global_orient, body_pose, jaw_pose, "
+      "leye_pose, "
       "reye_pose, "
       "left_hand_pose, right_hand_pose, color_net, avatar_features";
   const ProgramResult result = run_hsi4d({"check", "a.json"});
@@ -183,7 +184,7 @@ TEST_CASE("list tells losses and settings") {
   const std::string stages = cli::list_command("stages", test_losses());
   CHECK_THAT(stages, Contains("\nframe        scene  camera           Six numbers of the camera") &&
                          Contains("\nframe        all    body_pose        21 joints of the body\n"));
-  CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 2 * (1 + 14) + 1 + 5 + 3);
+  CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 2 * (1 + 15) + 1 + 5 + 3);
   CHECK_THAT(cli::list_command("scenes", test_losses()),
              Contains("\nscene      garden         a lawn with a path") &&
                  Contains("\nmotion     push           walks in a circle, pushing it") &&

@@ -125,6 +125,7 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
   const ColorNet net = some_color_net(clip.avatar);
   FrameGraphSettings settings = smooth_settings(rotations);
   settings.color_nets = {&net, 1};
+  settings.object_light = true;
   settings.color_camera_gradient = true;
   Tape<double> tape;
   FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
@@ -250,6 +251,7 @@ TEST_CASE("image, loss and every gradient have the same bits for any number of t
   Tape<float> tape;
   const ColorNet net = some_color_net(clip.avatar);
   FrameGraphSettings settings;
+  settings.object_light = true;
   settings.object_opacity = true;
   settings.color_nets = {&net, 1};
   settings.color_camera_gradient = true;

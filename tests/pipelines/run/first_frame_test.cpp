@@ -273,10 +273,10 @@ TEST_CASE("a stage over the first frame moves what one over a frame does", "[fir
   here.write("a.json", R"({"stages": {"first": {"over": "first_frame", "iterations": 3,
     "optimize": {"pose_latents": {"lr": 0.1}}, "losses": {"photometric": {}}}, "frame": {"iterations": 3,
     "optimize": {"transl": {"lr": 0.1}}, "losses": {"photometric": {}}}}})");
-  CHECK_THROWS_WITH(
-      load_run_config("a.json", {}, descriptions_of(loss_terms()), ConfigUse::kStages),
-      Catch::Matchers::Contains("/stages/first/optimize/pose_latents: there is no such parameter group; "
-                                "known here: camera, object_orient, object_transl, object_joint, transl, "));
+  CHECK_THROWS_WITH(load_run_config("a.json", {}, descriptions_of(loss_terms()), ConfigUse::kStages),
+                    Catch::Matchers::Contains(
+                        "/stages/first/optimize/pose_latents: there is no such parameter group; "
+                        "known here: camera, object_orient, object_transl, object_joint, object_light, transl, "));
 }
 
 }  // namespace first_frame_test

@@ -136,6 +136,7 @@ TEST_CASE(
   best["passes"]["count"] = 1;
   best["stages"]["interaction"]["iterations"] = 200;
   best["stages"]["interaction"]["losses"]["grip"]["weight"] = 0;
+  best["stages"]["interaction"]["optimize"].erase("object_light");
   std::map<std::string, nlohmann::json> methods = {
       {"paper", method_of(resolved_file(shipped("anyinteraction/base.json")))}, {"best", best}};
   std::map<std::string, std::set<std::string>> clips, datasets;
