@@ -595,8 +595,7 @@ void FrameGraph<S>::set_state(const SceneState& state) {
   if (settings_.draw == Draw::kScene) return;
   HSI4D_CHECK_EQ(state.objects.size(), objects_.size());
   for (std::size_t o = 0; o < objects_.size(); ++o) {
-    const ObjectLight light = state.lights.empty() ? ObjectLight{} : state.lights.at(o);
-    if (settings_.object_light) write_numbers(tape_, objects_[o].light, light.data());
+    if (settings_.object_light) write_numbers(tape_, objects_[o].light, light_of(state, o).data());
     if (const std::optional<ObjectJoint>& joint = clip_.objects[o].joint) {
       const double q = joint_value(*joint, parent_from_object(*joint, state.objects, o));
       write_numbers(tape_, objects_[o].joint, &q);

@@ -51,6 +51,10 @@ ObjectPose pose_of(const Rigid<double>& world_from_object) {
   return {so3_log(world_from_object.rotation), world_from_object.translation};
 }
 
+ObjectLight light_of(const SceneState& state, std::size_t object) {
+  return state.lights.empty() ? ObjectLight{} : state.lights.at(object);
+}
+
 PlaceSigmas no_sigmas(std::size_t objects, std::size_t others) {
   constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
   const std::vector<PlaceSigma> joints(static_cast<std::size_t>(kMetricJoints), {kNotANumber, kNotANumber});
@@ -67,7 +71,7 @@ void write_object_tracks(const std::string& path, const std::vector<std::string>
     writer.add<double>(names[o] + "/translation", {count, 3}, track(frames, o, &ObjectPose::translation));
     std::vector<double> numbers;
     for (const SceneState& frame : frames) {
-      const ObjectLight light = frame.lights.empty() ? ObjectLight{} : frame.lights.at(o);
+      const ObjectLight light = light_of(frame, o);
       numbers.insert(numbers.end(), light.begin(), light.end());
     }
     if (!frames.empty() && !frames.back().lights.empty()) writer.add<double>(names[o] + "/light", {count, 6}, numbers);

@@ -40,6 +40,9 @@ struct SceneState {
   const BodyPose& person(std::size_t p) const { return p == 0 ? body : others.at(p - 1); }
 };
 
+/// The light on an object; zeros where there is none.
+ObjectLight light_of(const SceneState& state, std::size_t object);
+
 /// How sure a place is in the axes of its frame's camera: one standard deviation, metres. Infinite: nothing tells it;
 /// not a number: nobody looked, as in a frame that is given.
 struct PlaceSigma {

@@ -118,8 +118,7 @@ std::vector<Entry> names_of(const Checkpoint& checkpoint, const char* key, const
   return entries;
 }
 
-/// One state as numbers: camera [R | t] (12), then 6 an object, then 6 of each light, then each body's transl (3) and
-/// axis-angles (165).
+/// One state as numbers: camera [R | t] (12), then 6 an object, then each body's transl (3) and axis-angles (165).
 void append(const SceneState& state, std::vector<double>& numbers) {
   for (Index r = 0; r < 3; ++r) {
     for (Index c = 0; c < 3; ++c) numbers.push_back(state.camera_from_world.rotation(r, c));
@@ -128,10 +127,6 @@ void append(const SceneState& state, std::vector<double>& numbers) {
   for (const ObjectPose& pose : state.objects) {
     numbers.insert(numbers.end(), pose.rotation.data(), pose.rotation.data() + 3);
     numbers.insert(numbers.end(), pose.translation.data(), pose.translation.data() + 3);
-  }
-  for (std::size_t o = 0; o < state.objects.size(); ++o) {
-    const ObjectLight light = state.lights.empty() ? ObjectLight{} : state.lights.at(o);
-    numbers.insert(numbers.end(), light.begin(), light.end());
   }
   for (std::size_t p = 0; p < state.people(); ++p) {
     const BodyPose& body = state.person(p);
@@ -154,7 +149,7 @@ void set_pixels(const std::vector<float>& pixels, Image& mask) {
 }
 
 Index numbers_per_state(const Clip& clip) {
-  return kRigidNumbers + 12 * std::ssize(clip.objects) + static_cast<Index>(clip.people()) * (3 + kPoseNumbers);
+  return kRigidNumbers + 6 * std::ssize(clip.objects) + static_cast<Index>(clip.people()) * (3 + kPoseNumbers);
 }
 
 SceneState state_from(const double* numbers, const Clip& clip) {
@@ -166,10 +161,6 @@ SceneState state_from(const double* numbers, const Clip& clip) {
   for (std::size_t o = 0; o < clip.objects.size(); ++o, numbers += 6) {
     state.objects.push_back({Vector3<double>(numbers), Vector3<double>(numbers + 3)});
   }
-  for (std::size_t o = 0; o < clip.objects.size(); ++o, numbers += 6)
-    std::copy_n(numbers, 6, state.lights.emplace_back().data());
-  if (std::all_of(state.lights.begin(), state.lights.end(), [](const ObjectLight& l) { return l == ObjectLight{}; }))
-    state.lights.clear();
   state.others.resize(clip.others.size());
   for (std::size_t p = 0; p < clip.people(); ++p, numbers += 3 + kPoseNumbers) {
     state.person(p).transl = Vector3<double>(numbers);
@@ -407,6 +398,45 @@ std::vector<PlaceSigmas> stored_sigmas(const Checkpoint& checkpoint, const Clip&
   return sigmas;
 }
 
+// ---- Lights on objects ----
+
+constexpr const char* kLights = "lights";  // 6 an object, of all states; absent where no stage has moved one
+
+/// Calls f(state) for all states, in the order of the file.
+template <class Progress, class F>
+void for_states(Progress& progress, const F& f) {
+  for (auto& stage : progress.after_stage) std::for_each(stage.begin(), stage.end(), f);
+  for (auto& stage : progress.first_frame) f(stage.state);
+  for (auto& stage : progress.later) std::for_each(stage.states.begin(), stage.states.end(), f);
+}
+
+void store_lights(const RunProgress& progress, Checkpoint& checkpoint) {
+  std::vector<double> numbers;
+  bool has_lights = false;
+  for_states(progress, [&](const SceneState& state) {
+    has_lights = has_lights || !state.lights.empty();
+    for (std::size_t o = 0; o < state.objects.size(); ++o) {
+      const ObjectLight light = light_of(state, o);
+      numbers.insert(numbers.end(), light.begin(), light.end());
+    }
+  });
+  if (has_lights) checkpoint.set(kLights, std::move(numbers));
+}
+
+void read_stored_lights(const Checkpoint& checkpoint, RunProgress& progress) {
+  if (!checkpoint.has(kLights)) return;
+  std::size_t lights = 0;
+  for_states(progress, [&lights](const SceneState& state) { lights += state.objects.size(); });
+  const double* next = stored_states(checkpoint, kLights, lights * std::tuple_size_v<ObjectLight>).data();
+  for_states(progress, [&next](SceneState& state) {
+    state.lights.resize(state.objects.size());
+    for (ObjectLight& light : state.lights) {
+      std::copy_n(next, light.size(), light.begin());
+      next += light.size();
+    }
+  });
+}
+
 }  // namespace
 
 const std::vector<SceneState>& result_of(const RunProgress& progress) {
@@ -440,6 +470,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   store_first_frame(progress.first_frame, checkpoint);
   store_unknowns(progress.unknowns, checkpoint);
   store_later(progress.later, checkpoint);
+  store_lights(progress, checkpoint);
   if (progress.bias) store_bias(*progress.bias, checkpoint);
   if (!progress.seen.empty()) store_seen(progress.seen, checkpoint);
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
@@ -494,6 +525,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   progress.first_frame = stored_first_frame(checkpoint, clip, first_stages);
   progress.unknowns = stored_unknowns(checkpoint, clip);
   progress.later = stored_later(checkpoint, clip, later);
+  read_stored_lights(checkpoint, progress);
   progress.bias = stored_bias(checkpoint, clip);
   progress.seen = stored_seen(checkpoint, clip, static_cast<std::size_t>(frames[0]));
   const std::vector<float>& covered = checkpoint.floats("covered");

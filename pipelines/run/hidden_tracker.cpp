@@ -66,7 +66,9 @@ void HiddenTracker::carry_hidden(Index index, const std::vector<SceneState>& kno
     const Index last = last_seen(index, o);
     const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, known));
     const Index from = std::ssize(known) > index ? index : last;
-    state.objects[o] = carried_pose(clip_, carrier, o, known[static_cast<std::size_t>(from)], state);
+    const SceneState& shown = known[static_cast<std::size_t>(from)];
+    state.objects[o] = carried_pose(clip_, carrier, o, shown, state);
+    if (!state.lights.empty()) state.lights[o] = light_of(shown, o);
   }
 }
 

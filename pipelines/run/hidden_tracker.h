@@ -40,7 +40,7 @@ class HiddenTracker {
   void start_hidden(Index index, const ClipFrame& frame, const std::vector<SceneState>& done, const ColorState& colors,
                     SceneState& state);
 
-  /// Whatever stages made of objects that the frame hides, these go with their carriers.
+  /// Whatever stages made of objects that the frame hides, these go with their carriers, in the light that they had.
   /// @param known  states by frame: those before, or, of a later pass, of all as the stages before it left them
   void carry_hidden(Index index, const std::vector<SceneState>& known, SceneState& state) const;
 

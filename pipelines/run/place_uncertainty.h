@@ -15,7 +15,8 @@
 //   mean of r²: f = n / (2 v w).
 // - A rotation of six numbers has three directions: numbers that the columns lose as they become a rotation count for
 //   nothing.
-// - What is held is known: the camera, the color net, all frames before, and in a later pass those after.
+// - What is held is known: the camera, the color net, the light on objects, all frames before, and in a later pass
+// those after.
 #pragma once
 
 #include <vector>

@@ -390,7 +390,8 @@ class Reconstruction {
   void remove_bias() {
     const ClipFrame frame = read_frame(clip_, 0);
     SceneState fitted = clip_.first;
-    if (clip_.frames() > 1) fitted.lights = progress_.after_stage.back()[1].lights;  // as other frames begin with one
+    // With no light at first the fit would take some of the light for depth.
+    if (clip_.frames() > 1) fitted.lights = progress_.after_stage.back()[1].lights;
     ColorState colors = progress_.colors;
     for (std::size_t s = first_stages_; s < later_stage(); ++s) {
       if (!fits_what_moves(s)) continue;

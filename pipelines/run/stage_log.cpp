@@ -49,8 +49,10 @@ class FramesOfMessages {
   std::vector<std::pair<LogLevel, std::string>> order_;
 };
 
-/// Hands, jaw and eyes: the body or an object may be in front of them.
-bool is_often_hidden(const std::string& group) { return group.ends_with("_pose") && group != "body_pose"; }
+/// Hands, jaw and eyes: the body or an object may be in front of them. Of an object its place tells that.
+bool is_often_hidden(const std::string& group) {
+  return (group.ends_with("_pose") && group != "body_pose") || group == kObjectLightGroup;
+}
 
 }  // namespace
 

@@ -49,10 +49,10 @@ Rigid<double> wrist_from_object(const Actor& actor, const Ground& ground) {
 double standing_at(SyntheticMotionKind motion) { return motion == SyntheticMotionKind::kPutDown ? kClipSeconds : 0; }
 
 /// What has to stand where for the object to stand there.
-/// @param first  the moment of standing_at
-ScenePlan plan_of(const Moment& first, const SyntheticObject& object, SyntheticMotionKind motion) {
+/// @param standing  the moment of standing_at
+ScenePlan plan_of(const Moment& standing, const SyntheticObject& object, SyntheticMotionKind motion) {
   ScenePlan plan;
-  plan.middle = is_walking(motion) ? Vector2<double>(0, 0.6) : first.figure.ground.place;
+  plan.middle = is_walking(motion) ? Vector2<double>(0, 0.6) : standing.figure.ground.place;
   plan.seen_from_y = is_walking(motion) ? -1.4 : 0.2;
   plan.has_screen = motion == SyntheticMotionKind::kPutDown;
   const bool stands = motion == SyntheticMotionKind::kPour || plan.has_screen ||
@@ -61,12 +61,12 @@ ScenePlan plan_of(const Moment& first, const SyntheticObject& object, SyntheticM
   plan.has_stand = stands && object.on_floor;
   if (object.hinge) {
     plan.has_posts = true;
-    plan.support = transform_point(*first.object, *object.hinge);
-    plan.support_turn = so3_log(first.object->rotation)[2];
+    plan.support = transform_point(*standing.object, *object.hinge);
+    plan.support_turn = so3_log(standing.object->rotation)[2];
   }
   if (!stands) return plan;
-  const Ground& ground = first.figure.ground;
-  const Vector foot = first.object->translation - Vector(0, 0, object.above_ground);
+  const Ground& ground = standing.figure.ground;
+  const Vector foot = standing.object->translation - Vector(0, 0, object.above_ground);
   plan.support = plan.has_table ? Vector(foot + ground.direction({0, 0.09, 0})) : foot;
   plan.support_turn = ground.heading_deg * kDegree;
   return plan;
@@ -294,9 +294,9 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
     if (place) clip.object.push_back(*place);
     clip.cameras.push_back(camera_at(first_viewpoint(settings), seconds, settings));
   }
-  Moment first = moment_at(actor, standing_at(settings.motion));
-  if (first.object) first.object = state_at(standing_at(settings.motion)).object;
-  clip.plan = plan_of(first, object, settings.motion);
+  Moment standing = moment_at(actor, standing_at(settings.motion));
+  if (standing.object) standing.object = state_at(standing_at(settings.motion)).object;
+  clip.plan = plan_of(standing, object, settings.motion);
   if (settings.place != nullptr) {
     clip.plan.place = settings.place;
     clip.plan.seen_from_y = settings.place->ground.place[1] - 1.4;

@@ -33,8 +33,7 @@ TEST_CASE("a run finds the light on an object, and has the same bits after an in
   config.data.objects.front().second.gaussians = (here.path() / "bright.ply").string();
 
   execute_tiny(config, "run");
-  const std::vector<double> light =
-      Npz::read("run/objects.npz").array(std::string(kTinyObject) + "/light").as<double>();
+  const std::vector<double> light = Npz::read("run/objects.npz").array(kTinyObject + "/light").as<double>();
   REQUIRE(light.size() == 6 * kTinyFrames);
   CHECK(std::all_of(light.begin(), light.begin() + 6, [](double x) { return x == 0; }));  // frame 0 is given
   const std::vector<double> last(light.end() - 6, light.end());
@@ -48,10 +47,44 @@ TEST_CASE("a run finds the light on an object, and has the same bits after an in
   CHECK(differences("run", "stopped") == std::vector<std::string>{});
 }
 
+TEST_CASE("lights of a second pass survive an interruption, with colours held and what is unseen left out",
+          "[run][passes]") {
+  const TemporaryFolder here;
+  nlohmann::ordered_json content = nlohmann::ordered_json::parse(R"({
+    "remove_depth_bias": true,
+    "approx": {"hold_colors": true, "seen_within_deg": 10},
+    "stages": {
+      "interaction": {"optimize": {"object_light": {"lr": 0.02}}, "losses": {"depth": null}},
+      "refinement": {
+        "over": "sequence", "iterations": 2, "optimize": {"transl": {"lr": 0.0001}}, "losses": {"fit": {}}
+      },
+      "again": {
+        "iterations": 5, "losses": {"photometric": {}},
+        "optimize": {"object_transl": {"lr": 0.002}, "object_light": {"lr": 0.01}}
+      }
+    }})");
+  content["extends"] = tiny_config_file();
+  here.write("lit.json", content.dump());
+  const RunConfig config = load_run_config("lit.json", {}, descriptions_of(loss_terms()));
+  int all = 0;
+  execute_tiny(config, "run", 1, false, [&all] { return ++all == 0; });
+  const std::vector<double> light = Npz::read("run/objects.npz").array(kTinyObject + "/light").as<double>();
+  CHECK(std::any_of(light.begin(), light.end(), [](double x) { return x != 0; }));
+  constexpr int kFirstPass = (kTinyFrames - 1) * kPerFrame;
+  for (const int last : {kFirstPass - 5, kFirstPass + 10 + 2 + 8}) {  // the second in the pass after the refinement
+    CAPTURE(last, all);
+    int count = 0;
+    const std::string run = "stopped" + std::to_string(last);
+    CHECK_THROWS_AS(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
+    execute_tiny(config, run, 2, true);
+    CHECK(differences("run", run) == std::vector<std::string>{});
+  }
+}
+
 TEST_CASE("a run that looks for no light writes none", "[run]") {
   const TemporaryFolder here;
   execute_tiny(tiny_config(), "run");
-  CHECK_FALSE(Npz::read("run/objects.npz").has(std::string(kTinyObject) + "/light"));
+  CHECK_FALSE(Npz::read("run/objects.npz").has(kTinyObject + "/light"));
 }
 
 }  // namespace object_light_run_test
