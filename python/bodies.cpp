@@ -169,8 +169,12 @@ void add_avatar_array(py::class_<Avatar>& type, const char* name, Type member, p
 // --- states ----------------------------------------------------------------------------------------------------------
 
 SceneState state_of(py::handle camera_from_world, const BodyPose& body, const py::sequence& objects,
-                    const std::vector<BodyPose>& others) {
+                    const std::vector<BodyPose>& others, const std::vector<ObjectLight>& lights) {
+  if (!lights.empty() && lights.size() != objects.size())
+    throw UserError("lights: " + std::to_string(lights.size()) +
+                    "; allowed: none, or one an object, of which there are " + std::to_string(objects.size()));
   SceneState state;
+  state.lights = lights;
   state.camera_from_world = rigid_of(camera_from_world, "camera_from_world");
   state.body = body;
   state.others = others;
@@ -234,7 +238,7 @@ void add_poses(py::module_& module) {
       py::arg("joints") = kSmplxJoints, "The rest pose of a body of so many joints, at its origin.");
   py::class_<SceneState>(module, "State", "All that moves, in one frame: camera, objects and bodies.")
       .def(py::init(&state_of), py::arg("camera_from_world"), py::arg("body"), py::arg("objects") = py::tuple(),
-           py::arg("others") = std::vector<BodyPose>())
+           py::arg("others") = std::vector<BodyPose>(), py::arg("lights") = std::vector<ObjectLight>())
       .def_property_readonly(
           "camera_from_world", [](const SceneState& state) { return array_of(state.camera_from_world); },
           "[4,4] metres. A copy.")
@@ -244,7 +248,10 @@ void add_poses(py::module_& module) {
           "body", [](const SceneState& state) { return state.body; }, "The body's pose.")
       .def_property_readonly(
           "others", [](const SceneState& state) { return state.others; },
-          "Poses of the people beside the first one, in the clip's order.");
+          "Poses of the people beside the first one, in the clip's order.")
+      .def_property_readonly(
+          "lights", [](const SceneState& state) { return state.lights; },
+          "Light on each object, six numbers (docs/running.md), in the clip's order; empty: none. A copy.");
 }
 
 void add_motions(py::module_& module) {

@@ -147,6 +147,7 @@ class State:
         body: BodyPose,
         objects: Sequence[tuple[ArrayLike, ArrayLike]] = (),
         others: Sequence[BodyPose] = (),
+        lights: Sequence[Sequence[float]] = (),
     ) -> None: ...
     @property
     def camera_from_world(self) -> _Doubles: ...
@@ -156,6 +157,8 @@ class State:
     def body(self) -> BodyPose: ...
     @property
     def others(self) -> list[BodyPose]: ...
+    @property
+    def lights(self) -> list[list[float]]: ...
 
 class Motion:
     def __init__(

@@ -180,6 +180,14 @@ class Bodies(unittest.TestCase):
             hsi4d.write_object_tracks("o.npz", {"cup": (np.zeros((3, 3)), np.zeros((2, 3)))})
         with self.assertRaisesRegex(hsi4d.UserError, r"objects\[0\]: allowed: a pair"):
             hsi4d.State(np.eye(4), hsi4d.rest_pose(), [np.zeros(3)])
+        with self.assertRaisesRegex(hsi4d.UserError, "lights: 1; allowed: none, or one an object, of which there are 0"):
+            hsi4d.State(np.eye(4), hsi4d.rest_pose(), [], lights=[[0] * 6])
+
+    def test_a_state_has_the_lights_that_it_is_given(self):
+        cup = [(np.zeros(3), np.zeros(3))]
+        self.assertEqual(hsi4d.State(np.eye(4), hsi4d.rest_pose(), cup).lights, [])
+        light = [0.1, 0.2, 0.3, -0.4, 0.5, 0.6]
+        self.assertEqual(hsi4d.State(np.eye(4), hsi4d.rest_pose(), cup, lights=[light]).lights, [light])
 
     def test_the_files_of_a_dataset(self):
         data = dataset().parent
