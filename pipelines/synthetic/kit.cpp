@@ -7,7 +7,6 @@
 #include "core/rotation.h"
 
 namespace hsi4d::detail {
-namespace {}  // namespace
 
 Rgb mixed(const Rgb& a, const Rgb& b, double part) { return a + (b - a) * std::clamp(part, 0.0, 1.0); }
 

@@ -471,4 +471,30 @@ TEST_CASE("in the clip for the demo the hand hides part of the object") {
   CHECK(hidden >= 4);
 }
 
+TEST_CASE("the screen hides what is put down, and nothing of it before") {
+  SyntheticSettings settings = demo_clip();
+  settings.scene = SyntheticSceneKind::kTerrace;
+  settings.motion = SyntheticMotionKind::kPutDown;
+  settings.object = SyntheticObjectKind::kVase;
+  settings.frames = 61;
+  settings.size_px = 96;
+  settings.scene_gaussians = 6000;
+  settings.object_gaussians = 600;
+  const SyntheticObject object = synthetic_object(settings);
+  const SyntheticClip clip = synthetic_clip(body(), object, clip_settings(settings));
+  AvatarSettings avatar_settings;
+  avatar_settings.gaussians = 1000;
+  const Gaussians scene = synthetic_scene(settings, clip.plan);
+  const Avatar avatar = surface_avatar(body(), avatar_settings);
+  const RenderSettings render = video_render_settings();
+  const SyntheticRenderer renderer(scene, object.gaussians, avatar, render);
+  const auto shown = [&](std::size_t t) {
+    return sum_of(renderer.frame(clip.motion.poses[t], clip.object[t], clip.cameras[t], 1).object_mask);
+  };
+  const double before = shown(0);
+  CHECK(before > 50);  // pixels
+  for (const std::size_t t : {18U, 30U, 42U}) CHECK(shown(t) < 0.02 * before);
+  CHECK(shown(60) > 0.8 * before);
+}
+
 }  // namespace motion_test
