@@ -61,6 +61,19 @@ PlaceSigmas no_sigmas(std::size_t objects, std::size_t others) {
   return {joints, std::vector<PlaceSigma>(objects, {kNotANumber, kNotANumber}), std::vector(others, joints)};
 }
 
+namespace {
+
+std::vector<double> light_track(const std::vector<SceneState>& frames, std::size_t object) {
+  std::vector<double> numbers;
+  for (const SceneState& frame : frames) {
+    const ObjectLight light = light_of(frame, object);
+    numbers.insert(numbers.end(), light.begin(), light.end());
+  }
+  return numbers;
+}
+
+}  // namespace
+
 void write_object_tracks(const std::string& path, const std::vector<std::string>& names,
                          const std::vector<SceneState>& frames, const std::vector<PlaceSigmas>& sigmas,
                          const std::vector<JointTrack>& joints) {
@@ -69,14 +82,10 @@ void write_object_tracks(const std::string& path, const std::vector<std::string>
   for (std::size_t o = 0; o < names.size(); ++o) {
     writer.add<double>(names[o] + "/rotation", {count, 3}, track(frames, o, &ObjectPose::rotation));
     writer.add<double>(names[o] + "/translation", {count, 3}, track(frames, o, &ObjectPose::translation));
-    std::vector<double> numbers;
-    for (const SceneState& frame : frames) {
-      const ObjectLight light = light_of(frame, o);
-      numbers.insert(numbers.end(), light.begin(), light.end());
-    }
-    if (!frames.empty() && !frames.back().lights.empty()) writer.add<double>(names[o] + "/light", {count, 6}, numbers);
-    numbers.clear();
+    if (!frames.empty() && !frames.back().lights.empty())
+      writer.add<double>(names[o] + "/light", {count, 6}, light_track(frames, o));
     if (sigmas.empty()) continue;
+    std::vector<double> numbers;
     for (const PlaceSigmas& frame : sigmas) append(frame.objects.at(o), numbers);
     writer.add<double>(names[o] + "/sigma", {count, 2}, numbers);
   }

@@ -216,6 +216,7 @@ void SceneKit::add_table() {
   }
 }
 
+/// Cameras look along +y: it stands on their side of what the table carries, and is higher than that.
 void SceneKit::add_screen() {
   const Point half(0.27, 0.02, 0.2);
   board(plan.support + Point(0.03, -0.2, half.z()), half, Rgb(0.36, 0.43, 0.5), 2, 0);
