@@ -23,17 +23,16 @@ FrameGraphSettings settings_of(bool object_light) {
   return settings;
 }
 
-Var<double> random_array(Tape<double>& tape, bool is_leaf, Shape shape, std::uint64_t seed) {
-  const Var<double> var = is_leaf ? tape.parameter("numbers", shape) : tape.constant("numbers", shape);
-  RandomSequence random(seed);
-  const Array<double> numbers = tape.write(var);
+/// The sum of its numbers, each times a random one.
+Var<double> weighed(Tape<double>& tape, Var<double> x) {
+  const Var<double> weights = tape.constant("weights", x.shape());
+  RandomSequence random(7);
+  const Array<double> numbers = tape.write(weights);
   for (Index r = 0; r < numbers.total_rows(); ++r) {
     for (Index c = 0; c < numbers.shape.cols; ++c) numbers.row(r)[c] = random.uniform(-1, 1);
   }
-  return var;
+  return sum(x * weights);
 }
-
-Var<double> weighed(Tape<double>& tape, Var<double> x) { return sum(x * random_array(tape, false, x.shape(), 7)); }
 
 std::vector<double> numbers_in(Tape<double>& tape, Var<double> x) {
   tape.forward(x);

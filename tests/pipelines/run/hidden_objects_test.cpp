@@ -4,6 +4,7 @@
 
 #include "body/kinematics.h"
 #include "core/image_io.h"
+#include "core/npz.h"
 #include "core/rigid.h"
 #include "core/rotation.h"
 #include "tests/support/tiny_run.h"
@@ -212,6 +213,7 @@ TEST_CASE("a run keeps what is hidden with its carrier, and has the same bits af
     "stages": {
       "interaction": {
         "iterations": 30,
+        "optimize": {"object_light": {"lr": 0.02}},
         "losses": {
           "depth": null,
           "center": {"weight": 1e-5, "by_share": true, "moves": "object"},
@@ -229,7 +231,10 @@ TEST_CASE("a run keeps what is hidden with its carrier, and has the same bits af
   CHECK(summary["per_frame"][14]["object_seen_share"].get<double>() < kHiddenBelow);
   CHECK(summary["per_frame"][0]["object_seen_share"].get<double>() > 0.3);
   CHECK(summary["quality"].contains("object_iou"));
-  // While nobody sees it, it goes with the person.
+  // While nobody sees it, it keeps its light, and goes with the person.
+  const std::vector<double> light = Npz::read("run/objects.npz").array("vase/light").as<double>();
+  CHECK(std::equal(light.begin() + 6 * 15, light.begin() + 6 * 16, light.begin() + 6 * 16));
+  CHECK_FALSE(std::equal(light.begin() + 6 * 5, light.begin() + 6 * 6, light.begin() + 6 * 6));
   const double of_hidden = summary["per_frame"][14]["object_translation_cm"], way = [&] {
     const auto truth = read_object_tracks("data/truth/objects.npz", {"vase"});
     return 100 * (truth[15][0].translation - truth[11][0].translation).norm();
