@@ -59,6 +59,17 @@ Image inset(const Image& mask, int margin) {
   return result;
 }
 
+/// How much each pixel of a picture counts: what shows the human, a margin within, and what the lens showed.
+Image counted(const ViewImage& picture, int margin) {
+  if (picture.mask.empty()) return picture.weight;
+  Image result = inset(picture.mask, margin);
+  if (picture.weight.empty()) return result;
+  for (int y = 0; y < result.height(); ++y) {
+    for (int x = 0; x < result.width(); ++x) result(0, y, x) *= picture.weight(0, y, x);
+  }
+  return result;
+}
+
 bool shows_somebody(const Image& mask) {
   for (int y = 0; y < mask.height(); ++y) {
     if (std::any_of(mask.row(0, y), mask.row(0, y) + mask.width(), [](float share) { return share >= kSeenFrom; }))
@@ -88,10 +99,8 @@ std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const View
                       " joints; the avatar has " + std::to_string(avatar.joint_count()));
     }
     loaded.image = view_image(set, view, background);
-    if (!loaded.image.mask.empty()) {
-      loaded.weight = inset(loaded.image.mask, settings.mask_inset_px);
-      loaded.is_seen = shows_somebody(loaded.image.mask);
-    }
+    loaded.weight = counted(loaded.image, settings.mask_inset_px);
+    loaded.is_seen = !loaded.image.mask.empty() && shows_somebody(loaded.image.mask);
     loaded.held = is_held(settings, view);
   }
   return views;
@@ -144,9 +153,9 @@ class FitGraph {
       for (Index i = 0; i < 9; ++i) rotations(j, i) = static_cast<S>(r(i / 3, i % 3));
     }
     write_image(inputs_.target, view.image.color);
-    if (!view.image.mask.empty()) {
+    if (!view.image.mask.empty()) write_image(inputs_.human_mask, view.image.mask);
+    if (!view.weight.empty()) {
       write_image(inputs_.weight, view.weight);
-      write_image(inputs_.human_mask, view.image.mask);
     } else {
       fill(inputs_.weight, S(1));
     }

@@ -20,7 +20,18 @@ struct ViewSetFile {
   int version = kViewSetVersion;
   fs::path motion, cameras;
   std::vector<PosedView> views;
+  fs::path photos;
+  Index frame = 0;
+  int longest_side = 0;
 };
+
+/// What a file says twice, or not at all; "": neither.
+std::string fault_of_pictures(const ViewSetFile& s) {
+  if (s.photos.empty()) return s.views.empty() ? "there is no view, and /photos names no pictures" : "";
+  return s.views.empty() && s.cameras.empty()
+             ? ""
+             : "photographs have cameras of their own; allowed: /cameras and /views, or /photos";
+}
 
 void describe(ConfigFields& f, PosedView& v) {
   f.path("image", v.image, {.must_exist = true, .may_be_empty = false}, "A picture").required();
@@ -33,18 +44,23 @@ void describe(ConfigFields& f, ViewSetFile& s) {
   f.string("format", s.format, "\"hsi4d views\"").required();
   f.integer("version", s.version, {.min = 1, .max = kViewSetVersion}, "Version of the format").required();
   f.path("motion", s.motion, {.must_exist = true, .may_be_empty = false}, "Poses").required();
-  f.path("cameras", s.cameras, {.must_exist = true, .may_be_empty = false}, "Cameras").required();
+  f.path("cameras", s.cameras, {.must_exist = true}, "Cameras");
   f.list("views", s.views, "Pictures", [](ConfigFields& inner, PosedView& view) { describe(inner, view); });
+  f.path("photos", s.photos, {.must_exist = true}, "Photographs with cameras, in place of cameras and views");
+  f.integer("frame", s.frame, {.min = 0}, "The frame of the motion that photographs show");
+  f.integer("longest_side", s.longest_side, {.min = 0, .max = 100000}, "Of photographs, px; 0: as they are");
   f.rule({"format"}, [&s] { return s.format == "hsi4d views" ? "" : "is not \"hsi4d views\""; });
-  f.rule({"views"}, [&s] { return s.views.empty() ? "there is no view" : ""; });
+  f.rule({"views"}, [&s] { return fault_of_pictures(s); });
+  f.rule({"cameras"}, [&s] { return s.photos.empty() && s.cameras.empty() ? "not given" : ""; });
 }
 
 /// Throws UserError unless camera and frame of every view are there.
 void check_numbers(const ViewSet& set) {
   const auto check = [&](std::size_t view, const char* what, Index number, std::size_t count) {
     if (number < static_cast<Index>(count)) return;
-    throw UserError(set.file.string() + ": /views/" + std::to_string(view) + "/" + what + ": " +
-                    std::to_string(number) + "; there are " + std::to_string(count) + ", counted from 0");
+    const std::string where = set.photos.empty() ? "/views/" + std::to_string(view) + "/" : "/";
+    throw UserError(set.file.string() + ": " + where + what + ": " + std::to_string(number) + "; there are " +
+                    std::to_string(count) + ", counted from 0");
   };
   for (std::size_t v = 0; v < set.views.size(); ++v) {
     check(v, "camera", set.views[v].camera, set.cameras.size());
@@ -75,6 +91,21 @@ ViewImage image_of_file(const PosedView& view, const Camera& camera) {
   return result;
 }
 
+ViewImage image_of_photo(const PosedImage& posed, const PhotoRules& rules) {
+  Photo photo = read_photo(posed, rules);
+  return {std::move(photo.color), std::move(photo.alpha), std::move(photo.weight)};
+}
+
+/// Every photograph becomes a view of the same frame.
+void add_photos(const ViewSetFile& read, ViewSet& set) {
+  set.photos = read_posed_images(read.photos).images;
+  set.photo_rules.longest_side = read.longest_side;
+  for (const PosedImage& photo : set.photos) {
+    set.views.push_back({photo.image, photo.mask, std::ssize(set.cameras), read.frame});
+    set.cameras.push_back(photo_camera(photo, set.photo_rules));
+  }
+}
+
 }  // namespace
 
 std::vector<fs::path> ViewSet::files() const {
@@ -91,12 +122,17 @@ ViewSet read_view_set(const fs::path& file) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, {}, problems);
   const ViewSetFile read = read_settings<ViewSetFile>(tree, problems);
-  ViewSet set{file,
-              read_motion_with_warnings(read.motion.string()),
-              read_cameras(read.cameras.string()),
-              read.views,
-              read.motion,
-              read.cameras};
+  ViewSet set;
+  set.file = file;
+  set.motion = read_motion_with_warnings(read.motion.string());
+  set.motion_file = read.motion;
+  if (read.photos.empty()) {
+    set.cameras = read_cameras(read.cameras.string());
+    set.views = read.views;
+    set.cameras_file = read.cameras;
+  } else {
+    add_photos(read, set);
+  }
   check_begins_with_frame_0(set.motion, read.motion.string(),
                             "views count its poses from 0 (\"frame\"), so one that begins there is needed");
   check_numbers(set);
@@ -123,8 +159,11 @@ std::string view_set_json(const std::string& motion, const std::string& cameras,
 }
 
 ViewImage view_image(const ViewSet& set, const PosedView& view, const Vector3<double>& background) {
-  const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
-  ViewImage result = set.video ? image_of_frame(*set.video, view, camera) : image_of_file(view, camera);
+  const auto number = static_cast<std::size_t>(view.camera);
+  const Camera& camera = set.cameras[number];
+  ViewImage result = set.video             ? image_of_frame(*set.video, view, camera)
+                     : !set.photos.empty() ? image_of_photo(set.photos[number], set.photo_rules)
+                                           : image_of_file(view, camera);
   if (result.mask.empty()) return result;
   for (int c = 0; c < 3; ++c) {
     const auto behind = static_cast<float>(background[c]);

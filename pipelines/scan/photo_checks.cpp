@@ -96,6 +96,39 @@ bool is_black(const Image& image) {
   return !image.empty() && std::all_of(numbers.begin(), numbers.end(), [](float x) { return x == 0; });
 }
 
+/// The median of some numbers; 0 of none.
+float median(std::vector<float> numbers) {
+  if (numbers.empty()) return 0;
+  const auto middle = numbers.begin() + std::ssize(numbers) / 2;
+  std::nth_element(numbers.begin(), middle, numbers.end());
+  return *middle;
+}
+
+/// Median of the depths that are known; 0: none is.
+float median_depth(const Photo& photo) {
+  const std::span<const float> all = photo.depth.data();
+  std::vector<float> known;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(known), [](float z) { return z > 0; });
+  return median(std::move(known));
+}
+
+/// A camera within a wall or a thing sees the inside of its surface, far nearer than what the others see.
+void tell_inside(const PosedImages& set, const std::vector<Photo>& photos) {
+  constexpr float kInside = 0.02F;  // of the others' median depth
+  std::vector<float> depths, known;
+  for (const Photo& photo : photos) depths.push_back(photo.depth.empty() ? 0 : median_depth(photo));
+  std::copy_if(depths.begin(), depths.end(), std::back_inserter(known), [](float z) { return z > 0; });
+  const float usual = median(std::move(known));
+  std::vector<std::string> inside;
+  for (std::size_t i = 0; i < depths.size(); ++i) {
+    if (depths[i] > 0 && depths[i] < kInside * usual) inside.push_back(set.images[i].name);
+  }
+  if (inside.empty()) return;
+  log_warning(set.file.string() + ": half of what " + std::to_string(inside.size()) + " of " +
+              std::to_string(photos.size()) + " pictures show is nearer than " + rounded(kInside * usual, 2) +
+              ", the others look " + rounded(usual, 2) + " far: cameras in a wall? " + few_names(inside));
+}
+
 std::string size_of(const fs::path& file) { return file.empty() ? "-" : std::to_string(fs::file_size(file)); }
 
 }  // namespace
@@ -121,6 +154,7 @@ void check_what_counts(const ScanSettings& settings, const PosedImages& set, con
       std::any_of(photos.begin(), photos.end(), [](const Photo& photo) { return !photo.depth.empty(); });
   if (reads_depths(settings.stage) && !any_depth)
     log_info(set.file.string() + ": has no depths; losses that read them are off");
+  tell_inside(set, photos);
   if (settings.kind != ScanKind::kObject) return;
   const auto without =
       std::count_if(photos.begin(), photos.end(), [](const Photo& photo) { return photo.alpha.empty(); });

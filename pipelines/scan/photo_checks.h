@@ -14,8 +14,8 @@ namespace hsi4d {
 /// from one side.
 void check_photo_cameras(const ScanSettings& settings, const PosedImages& set);
 
-/// Throws UserError where nothing of any picture counts or is wanted. Warns of single pictures of that kind, and of
-/// pictures of an object in which nothing says what is behind it.
+/// Throws UserError where nothing of any picture counts or is wanted. Warns of single pictures of that kind, of
+/// pictures of an object in which nothing says what is behind it, and of depths as a camera in a wall has them.
 void check_what_counts(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos);
 
 /// What a checkpoint belongs to, beside its config: names, cameras and sizes of the files of all pictures.

@@ -10,6 +10,8 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/parallel.h"
+#include "core/text.h"
+#include "optim/metrics.h"
 #include "pipelines/avatar/offsets.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/draw/posed_avatar.h"
@@ -224,6 +226,71 @@ TEST_CASE("a picture's alpha is its mask, and views that make no sense are refus
   CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("/version"));
   write_text_file(file, R"({"format": "views", "version": 1, "motion": "motion.npz", "cameras": "cameras.json"})");
   CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("hsi4d views"));
+}
+
+TEST_CASE("photographs whose cameras another program found are views of one frame") {
+  const ScratchFolder folder;
+  const ViewSet made = read_view_set(made_views());
+  const auto write = [&](const std::string& lens) {
+    std::string frames;
+    fs::create_directories(folder / "images");
+    for (const PosedView& view : made.views) {
+      if (view.frame != 1) continue;
+      const std::string name = "images/" + std::to_string(view.camera) + ".png";
+      fs::copy_file(view.image, folder / name, fs::copy_options::overwrite_existing);
+      const Camera& camera = made.cameras[static_cast<std::size_t>(view.camera)];
+      std::string rows;
+      const Matrix4<double> pose = matrix_from_rigid(inverse(camera.camera_from_world));
+      for (Index i = 0; i < 4; ++i) {
+        rows += i == 0 ? "[" : ", [";
+        for (Index j = 0; j < 4; ++j)
+          rows += (j == 0 ? "" : ", ") + number_text(j == 1 || j == 2 ? -pose(i, j) : pose(i, j));
+        rows += "]";
+      }
+      frames +=
+          (frames.empty() ? "" : ", ") + (R"({"file_path": ")" + name) + R"(", "transform_matrix": [)" + rows + "]}";
+    }
+    const Camera& camera = made.cameras.front();
+    write_text_file(folder / "transforms.json", R"({"w": 96, "h": 96, "cx": 48, "cy": 48, "fl_x": )" +
+                                                    number_text(camera.fx) + R"(, "fl_y": )" + number_text(camera.fy) +
+                                                    lens + R"(, "frames": [)" + frames + "]}");
+  };
+  const auto views_json = [&](const std::string& more) {
+    write_text_file(folder / "views.json", R"({"format": "hsi4d views", "version": 1, "motion": ")" +
+                                               made.motion_file.string() + R"(", "photos": "transforms.json")" + more +
+                                               "}");
+    return fs::path(folder / "views.json");
+  };
+  write("");
+  const ViewSet set = read_view_set(views_json(R"(, "frame": 1)"));
+  REQUIRE(set.views.size() == 4);
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(set.views[i].camera == static_cast<Index>(i));
+    CHECK(set.views[i].frame == 1);
+    const ViewImage photo = view_image(set, set.views[i], {0, 0, 1}),
+                    view = view_image(made, made.views[4 + i], {0, 0, 1});
+    CHECK(psnr_db(photo.color, view.color) > 100);
+    CHECK(psnr_db(photo.mask, view.mask) > 100);
+    CHECK(photo.weight.empty());
+  }
+  AvatarFitSettings settings = quick_fit(folder / "views.json", 1);  // the truth shows them
+  settings.avatar = made_views().parent_path() / "truth" / "avatar.safetensors";
+  settings.color_net.use = ColorNetUse::kOff;
+  settings.render = video_render_settings();
+  settings.render.blur = 0.15;
+  settings.stage.optimize = {{"colors", {.lr = 1e-12, .until = {}}}};
+  CHECK(fitted(settings).learnt.psnr_db > 38);
+  CHECK(fitted(settings).held.views == 1);
+
+  CHECK(read_view_set(views_json(R"(, "longest_side": 48)")).cameras.front().width == 48);
+  write(R"(, "k1": 0.3)");  // straightened: its corners are of no pixel
+  const ViewSet bent = read_view_set(views_json(R"(, "frame": 1)"));
+  const ViewImage straight = view_image(bent, bent.views[0], {0, 0, 1});
+  CHECK(straight.weight(0, 48, 48) == 1);
+  CHECK(straight.mask(0, 48, 48) == 1);
+  CHECK_THROWS_WITH(read_view_set(views_json(R"(, "frame": 2)")), Catch::Contains("json: /frame: 2; there are 2"));
+  CHECK_THROWS_WITH(read_view_set(views_json(R"(, "cameras": "transforms.json")")),
+                    Catch::Contains("photographs have cameras of their own"));
 }
 
 TEST_CASE("an avatar fit refuses what it cannot do, and stops when asked") {

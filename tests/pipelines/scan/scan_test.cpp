@@ -169,6 +169,26 @@ TEST_CASE("pictures of which nothing counts are refused, or told") {
                     Catch::Matchers::Contains("12 of 12 pictures show nothing that counts"));
 }
 
+TEST_CASE("pictures from within a wall are told by their depths") {
+  const ScanSettings settings = quick_scan(5);
+  const PosedImages set = read_posed_images(made_photos());
+  std::vector<Photo> photos;
+  for (const PosedImage& image : set.images) photos.push_back(read_photo(image, {}));
+  const auto told = [&] {
+    std::string warnings;
+    const LogSink sink = log_to([&](LogLevel, std::string_view text) { warnings += text; }, LogLevel::kWarning);
+    check_what_counts(settings, set, photos);
+    return warnings;
+  };
+  REQUIRE_FALSE(photos[3].depth.empty());
+  CHECK(told() == "");
+  for (float& z : photos[3].depth.data()) z *= 0.01F;
+  CHECK_THAT(told(), Catch::Matchers::Contains("half of what 1 of 12 pictures show is nearer than ") &&
+                         Catch::Matchers::Contains("cameras in a wall? " + set.images[3].name));
+  for (float& z : photos[3].depth.data()) z = 0;  // not known
+  CHECK(told() == "");
+}
+
 TEST_CASE("the report of a reconstruction is not written over by that of a run") {
   const fs::path folder = folder_named("kept");
   run_scan(quick_scan(3), folder, false, loss_terms());
