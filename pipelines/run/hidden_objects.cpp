@@ -26,10 +26,19 @@ constexpr double kHandShift = 0.01;          // metres that a hand may shift wha
 constexpr double kHalf = 0.5;                // of a pixel is covered
 const Vector kBehindCamera(0, 0, -1000);     // metres
 
+/// A turn about the vertical by the angle in which the pelvis shows its left.
+Matrix3<double> heading_of(const BodyPose& pose) {
+  const Vector left = so3_exp(pose.rotation_of(0)) * Vector(1, 0, 0);
+  return so3_exp(Vector(0, 0, std::atan2(left[1], left[0])));
+}
+
 /// world_from_carrier.
 Rigid<double> carrier_pose(const Clip& clip, const Carrier& carrier, const SceneState& state) {
   if (!carrier.joint) return {};
-  const PosedJoints body = pose_skeleton(clip.person(carrier.person).avatar, state.person(carrier.person));
+  const BodyPose& person = state.person(carrier.person);
+  const Avatar& avatar = clip.person(carrier.person).avatar;
+  if (carrier.is_upright) return {heading_of(person), Vector(pose_joints(avatar, person).data() + 3 * *carrier.joint)};
+  const PosedJoints body = pose_skeleton(avatar, person);
   const double* const row = body.transforms.data() + 12 * *carrier.joint;
   Rigid<double> pose;
   for (Index r = 0; r < 3; ++r) {
@@ -102,7 +111,9 @@ double shown_share(const Clip& clip, double pixels, std::size_t object, const Sc
 
 std::string carrier_text(const Clip& clip, const Carrier& carrier) {
   if (!carrier.joint) return "stays where it was";
-  return "stays with the chest" + (carrier.person == 0 ? "" : " of " + clip.person(carrier.person).name);
+  const std::optional<std::size_t> hand = hand_of_joint(*carrier.joint);
+  const std::string part = !hand ? "chest" : *hand == 0 ? "left hand" : "right hand";
+  return "stays with the " + part + (carrier.person == 0 ? "" : " of " + clip.person(carrier.person).name);
 }
 
 std::vector<double> seen_shares(const Clip& clip, const ClipFrame& frame, double mask_threshold,
@@ -140,22 +151,6 @@ ObjectPose carried_pose(const Clip& clip, const Carrier& carrier, std::size_t ob
   const Rigid<double> to_from_from =
       compose(carrier_pose(clip, carrier, to), inverse(carrier_pose(clip, carrier, from)));
   return pose_of(compose(to_from_from, rigid_of(from.objects[object])));
-}
-
-void lay_between(const Clip& clip, const Carrier& carrier, std::size_t object, std::size_t begin, std::size_t end,
-                 std::vector<SceneState>& states) {
-  const auto as_seen = [&](std::size_t t) {
-    return compose(inverse(carrier_pose(clip, carrier, states[t])), rigid_of(states[t].objects[object]));
-  };
-  const Rigid<double> from = as_seen(begin), to = as_seen(end);
-  const Vector turn = so3_log(Matrix3<double>(from.rotation.transpose() * to.rotation));
-  for (std::size_t t = begin + 1; t < end; ++t) {
-    const double share = static_cast<double>(t - begin) / static_cast<double>(end - begin);
-    Rigid<double> between;
-    between.rotation = from.rotation * so3_exp(Vector(share * turn));
-    between.translation = (1 - share) * from.translation + share * to.translation;
-    states[t].objects[object] = pose_of(compose(carrier_pose(clip, carrier, states[t]), between));
-  }
 }
 
 std::optional<double> object_iou(const StatePicture& picture, const ClipFrame& frame, std::size_t object) {

@@ -27,13 +27,14 @@ inline constexpr double kDoubtfulIou = 0.5, kLostIou = 0.2;
 
 /// What an object goes with while nobody sees it: a joint of the body, or the world.
 struct Carrier {
-  std::optional<Index> joint;  ///< the chest; none: the world
+  std::optional<Index> joint;  ///< the chest, or a wrist; none: the world
   std::size_t person = 0;      ///< whose
+  bool is_upright = false;     ///< turns with the way that the pelvis looks alone, not as the joint does
 
   bool operator==(const Carrier&) const = default;
 };
 
-/// "stays with the chest", "stays with the chest of friend", "stays where it was".
+/// "stays with the chest", "stays with the left hand of friend", "stays where it was".
 std::string carrier_text(const Clip& clip, const Carrier& carrier);
 
 /// How much of each object a frame shows: the pixels of its mask over those that it would cover alone, at most 1; 0
@@ -60,11 +61,6 @@ Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const
 /// The pose of an object that goes with its carrier from one state to another.
 ObjectPose carried_pose(const Clip& clip, const Carrier& carrier, std::size_t object, const SceneState& from,
                         const SceneState& to);
-
-/// Lays an object in frames between `begin` and `end`, which show it, on a path that turns and moves evenly as its
-/// carrier sees it.
-void lay_between(const Clip& clip, const Carrier& carrier, std::size_t object, std::size_t begin, std::size_t end,
-                 std::vector<SceneState>& states);
 
 /// Intersection over union of what is drawn of an object and its mask; nothing where that shows at most a sliver.
 /// @param picture  with silhouettes

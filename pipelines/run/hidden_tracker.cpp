@@ -3,6 +3,8 @@
 #include <optional>
 #include <utility>
 
+#include "pipelines/run/hidden_path.h"
+
 namespace hsi4d {
 
 HiddenTracker::HiddenTracker(const RunConfig& config, const Clip& clip, std::vector<std::vector<double>>& seen,
@@ -94,13 +96,20 @@ void HiddenTracker::look_for_lost(At at, const ClipFrame& frame, const std::vect
   }
 }
 
-void HiddenTracker::lay_hidden(std::vector<SceneState>& states) const {
+void HiddenTracker::lay_hidden(const ColorState& colors, const std::vector<PlaceSigmas>& sigmas,
+                               std::vector<SceneState>& states) const {
   for (std::size_t o = 0; is_on() && o < clip_.objects.size(); ++o) {
+    const auto contradicted = [&](std::size_t t, const SceneState& state) {
+      const double drawn = drawn_share(clip_, picture_of_state(config_, clip_, state, colors), o, state);
+      return drawn >= seen_[t][o] + kHiddenBelow;
+    };
     for (Index t = 1; t < clip_.frames(); ++t) {
       const Index last = last_seen(t, o);
       if (is_hidden(t, o) || last == t - 1) continue;
       const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, states));
-      lay_between(clip_, carrier, o, static_cast<std::size_t>(last), static_cast<std::size_t>(t), states);
+      const HiddenGap gap{o, static_cast<std::size_t>(last), static_cast<std::size_t>(t)};
+      const std::string text = lay_gap(clip_, carrier, gap, contradicted, sigmas, states);
+      if (!text.empty()) note_(text);
     }
   }
 }

@@ -50,9 +50,11 @@ class HiddenTracker {
   void look_for_lost(At at, const ClipFrame& frame, const std::vector<SceneState>& known, const SceneState& before,
                      const ColorState& colors, SceneState& state) const;
 
-  /// Between two frames that show it a hidden object is on a smooth path.
+  /// Between two frames that show it a hidden object is on a smooth path (hidden_path.h).
+  /// @param sigmas  by frame, where they are known
   /// @param states  of all frames
-  void lay_hidden(std::vector<SceneState>& states) const;
+  void lay_hidden(const ColorState& colors, const std::vector<PlaceSigmas>& sigmas,
+                  std::vector<SceneState>& states) const;
 
  private:
   bool is_hidden(Index frame, std::size_t object) const;

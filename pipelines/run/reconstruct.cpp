@@ -145,7 +145,7 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
-    if (progress_.later.empty()) hidden_.lay_hidden(progress_.after_stage.back());
+    if (progress_.later.empty()) hidden_.lay_hidden(progress_.colors, progress_.sigmas, progress_.after_stage.back());
     if (config_.remove_depth_bias && !progress_.bias) remove_bias();
     if (has_later()) {
       run_later_stages();

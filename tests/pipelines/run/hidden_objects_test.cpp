@@ -7,6 +7,7 @@
 #include "core/npz.h"
 #include "core/rigid.h"
 #include "core/rotation.h"
+#include "pipelines/run/hidden_path.h"
 #include "tests/support/tiny_run.h"
 
 namespace hidden_objects_test {
@@ -135,6 +136,76 @@ TEST_CASE("between two frames an object turns and moves evenly as its carrier se
             Approx(share * 0.3).margin(1e-9));
     }
   }
+}
+
+TEST_CASE("what goes with a hand and stays upright turns with the person alone") {
+  const Clip clip = tiny_clip();
+  const Carrier hand{kRightWrist, 0, true};
+  const std::vector<SceneState> states = walk(clip, hand, held_by(clip, kRightWrist));
+  for (const SceneState& state : states)
+    CHECK((state.objects[0].translation - joint_of(clip, state, kRightWrist)).norm() < 1e-12);
+  const Rigid<double> first = pose_in(states.front()), last = pose_in(states.back());
+  const Matrix3<double> turn = so3_exp(Vector3<double>(0, 0, 0.9));  // three steps of walk
+  CHECK((last.rotation - turn * first.rotation).norm() < 1e-9);
+  CHECK(carrier_text(clip, hand) == "stays with the right hand");
+  CHECK(carrier_text(clip, {kLeftWrist, 0, true}) == "stays with the left hand");
+}
+
+TEST_CASE("what frames say is not with the chest goes with the hand that images know, as far as they allow") {
+  const Clip clip = tiny_clip();
+  std::vector<SceneState> states = walk(clip, {kRightWrist, 0, true}, held_by(clip, kRightWrist));
+  while (states.size() < 10) states.push_back(moved(states.back(), 0.1, {0.02, 0.01, 0}));
+  for (std::size_t t = 3; t < 7; ++t) states[t].body.set_rotation(19, Vector3<double>(0, 1.2, 0));  // the right elbow
+  const HiddenGap gap{0, 1, 8};
+  states[8].objects[0] = carried_pose(clip, {kRightWrist, 0, true}, 0, states[1], states[8]);
+  states[8].objects[0].translation += Vector3<double>(0.02, 0, 0);
+  std::vector<PlaceSigmas> sigmas(states.size(), no_sigmas(1));
+  for (PlaceSigmas& of_frame : sigmas) {
+    of_frame.joints[kLeftWrist].across = 0.02;
+    of_frame.joints[kRightWrist].across = 0.01;
+  }
+  const auto distance = [&](std::size_t t) {
+    return (states[t].objects[0].translation - joint_of(clip, states[t], kRightWrist)).norm();
+  };
+  const auto is_far = [&](double most) {
+    return [&, most](std::size_t t, const SceneState& state) {
+      return (state.objects[0].translation - joint_of(clip, states[t], kRightWrist)).norm() > most;
+    };
+  };
+  const Carrier chest{kChest};
+  const std::vector<SceneState> start = states;
+
+  CHECK(lay_gap(
+            clip, chest, gap, [](auto...) { return false; }, sigmas, states) == "");
+  const std::vector<SceneState> with_chest = states;
+  CHECK(distance(4) > 0.05);
+  states = start;
+  CHECK(lay_gap(clip, chest, gap, is_far(0.03), {}, states) == "");  // no sigmas tell which hand
+  for (std::size_t t = 0; t < states.size(); ++t) {
+    CHECK(states[t].objects[0].translation == with_chest[t].objects[0].translation);
+    CHECK(states[t].objects[0].rotation == with_chest[t].objects[0].rotation);
+  }
+
+  CHECK(lay_gap(clip, chest, gap, is_far(0.03), sigmas, states) ==
+        "frames 2 to 7: watering_can, of which more would show, stays with the right hand to frame 7 and from frame 2");
+  for (std::size_t t = 2; t < 8; ++t) {
+    CAPTURE(t);
+    CHECK(distance(t) <= 0.02 + 1e-9);  // evenly from no distance to two centimetres
+    CHECK(distance(t) >= distance(t - 1) - 1e-9);
+  }
+
+  // In frames 4 to 6 it may not be there either: it is put down, and taken again.
+  const auto but_middle = [&](std::size_t t, const SceneState& state) {
+    return (t >= 4 && t <= 6) || is_far(0.03)(t, state);
+  };
+  CHECK_THAT(lay_gap(clip, chest, gap, but_middle, sigmas, states), Contains("right hand to frame 3 and from frame 7"));
+  CHECK(distance(3) == Approx(0).margin(1e-9));
+  CHECK(distance(7) == Approx(0.02).margin(1e-9));
+  const Vector3<double> put = states[3].objects[0].translation, taken = states[7].objects[0].translation;
+  CHECK((states[5].objects[0].translation - (put + taken) / 2).norm() < 1e-9);
+  // The other hand, where images know that one.
+  for (PlaceSigmas& of_frame : sigmas) of_frame.joints[kLeftWrist].across = 0.001;
+  CHECK_THAT(lay_gap(clip, chest, gap, is_far(0.03), sigmas, states), Contains("stays with the left hand to frame "));
 }
 
 TEST_CASE("the share of an object that is seen is that of its mask") {

@@ -1,0 +1,96 @@
+#include "pipelines/run/hidden_path.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/rigid.h"
+#include "core/rotation.h"
+#include "optim/motion_start.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// A carrier, from one end of a gap to the last frame that does not speak against it.
+struct Carried {
+  Carrier carrier;
+  std::size_t from = 0, last = 0;
+};
+
+/// Between two poses, evenly; share 0: the first.
+Rigid<double> between(const Rigid<double>& from, const Rigid<double>& to, double share) {
+  const Vector3<double> turn = so3_log(Matrix3<double>(from.rotation.transpose() * to.rotation));
+  return {from.rotation * so3_exp(Vector3<double>(share * turn)),
+          (1 - share) * from.translation + share * to.translation};
+}
+
+/// The frame nearer to `to` by one.
+std::size_t next_to(std::size_t frame, std::size_t to) { return frame < to ? frame + 1 : frame - 1; }
+
+/// The hand whose wrist images know better while the object is hidden.
+Carrier known_hand(const HiddenGap& gap, std::size_t person, const std::vector<PlaceSigmas>& sigmas) {
+  std::array<double, kWristJoints.size()> doubts = {};
+  for (std::size_t t = gap.begin + 1; t < gap.end; ++t) {
+    const std::vector<PlaceSigma>& joints = person == 0 ? sigmas[t].joints : sigmas[t].others.at(person - 1);
+    for (std::size_t hand = 0; hand < doubts.size(); ++hand)
+      doubts[hand] += joints.at(static_cast<std::size_t>(kWristJoints[hand])).across;
+  }
+  return {kWristJoints[doubts[1] < doubts[0] ? 1 : 0], person, true};
+}
+
+/// How far a hand gets into a gap from one of its ends.
+Carried carried_from(const Clip& clip, const Carrier& hand, std::size_t object, std::size_t from, std::size_t to,
+                     const Contradicted& contradicted, const std::vector<SceneState>& states) {
+  Carried carried{hand, from, from};
+  for (std::size_t t = next_to(from, to); t != to; t = next_to(t, to)) {
+    SceneState state = states[t];
+    state.objects[object] = carried_pose(clip, hand, object, states[from], state);
+    if (contradicted(t, state)) break;
+    carried.last = t;
+  }
+  return carried;
+}
+
+/// From both ends as far as they get, and evenly between.
+void lay_carried(const Clip& clip, const Carried& before, const Carried& after, std::size_t object,
+                 std::vector<SceneState>& states) {
+  const auto pose_in = [&](const Carried& carried, std::size_t t) {
+    return rigid_of(carried_pose(clip, carried.carrier, object, states[carried.from], states[t]));
+  };
+  const auto low = static_cast<double>(std::min(before.last, after.last)),
+             high = static_cast<double>(std::max(before.last, after.last));
+  std::vector<ObjectPose> poses;
+  for (std::size_t t = before.from + 1; t < after.from; ++t) {
+    const double share = high > low ? std::clamp((static_cast<double>(t) - low) / (high - low), 0.0, 1.0)
+                                    : (static_cast<double>(t) > low ? 1.0 : 0.0);
+    const bool overlap = before.last > after.last;
+    poses.push_back(pose_of(between(pose_in(before, overlap ? t : std::min(t, before.last)),
+                                    pose_in(after, overlap ? t : std::max(t, after.last)), share)));
+  }
+  for (std::size_t i = 0; i < poses.size(); ++i) states[before.from + 1 + i].objects[object] = poses[i];
+}
+
+}  // namespace
+
+void lay_between(const Clip& clip, const Carrier& carrier, std::size_t object, std::size_t begin, std::size_t end,
+                 std::vector<SceneState>& states) {
+  lay_carried(clip, {carrier, begin, end}, {carrier, end, begin}, object, states);
+}
+
+std::string lay_gap(const Clip& clip, const Carrier& carrier, const HiddenGap& gap, const Contradicted& contradicted,
+                    const std::vector<PlaceSigmas>& sigmas, std::vector<SceneState>& states) {
+  lay_between(clip, carrier, gap.object, gap.begin, gap.end, states);
+  if (!carrier.joint || sigmas.empty()) return "";
+  bool is_wrong = false;
+  for (std::size_t t = gap.begin + 1; t < gap.end; ++t) is_wrong = is_wrong || contradicted(t, states[t]);
+  if (!is_wrong) return "";
+  const Carrier hand = known_hand(gap, carrier.person, sigmas);
+  const Carried before = carried_from(clip, hand, gap.object, gap.begin, gap.end, contradicted, states),
+                after = carried_from(clip, hand, gap.object, gap.end, gap.begin, contradicted, states);
+  lay_carried(clip, before, after, gap.object, states);
+  return "frames " + std::to_string(gap.begin + 1) + " to " + std::to_string(gap.end - 1) + ": " +
+         clip.objects[gap.object].name + ", of which more would show, " + carrier_text(clip, hand) + " to frame " +
+         std::to_string(before.last) + " and from frame " + std::to_string(after.last);
+}
+
+}  // namespace hsi4d
