@@ -51,6 +51,24 @@ Carried carried_from(const Clip& clip, const Carrier& hand, std::size_t object, 
   return carried;
 }
 
+/// Where a hand that does not carry it all the way has it lowest: there it is put down, or taken.
+std::size_t lowest(const Clip& clip, const Carried& carried, std::size_t object,
+                   const std::vector<SceneState>& states) {
+  const auto height = [&](std::size_t t) {
+    return carried_pose(clip, carried.carrier, object, states[carried.from], states[t]).translation[2];
+  };
+  std::size_t best = carried.from;
+  double least = height(best);
+  for (std::size_t t = best; t != carried.last;) {
+    t = next_to(t, carried.last);
+    const double now = height(t);
+    if (now >= least) continue;
+    least = now;
+    best = t;
+  }
+  return best;
+}
+
 /// From both ends as far as they get, and evenly between.
 void lay_carried(const Clip& clip, const Carried& before, const Carried& after, std::size_t object,
                  std::vector<SceneState>& states) {
@@ -85,8 +103,12 @@ std::string lay_gap(const Clip& clip, const Carrier& carrier, const HiddenGap& g
   for (std::size_t t = gap.begin + 1; t < gap.end; ++t) is_wrong = is_wrong || contradicted(t, states[t]);
   if (!is_wrong) return "";
   const Carrier hand = known_hand(gap, carrier.person, sigmas);
-  const Carried before = carried_from(clip, hand, gap.object, gap.begin, gap.end, contradicted, states),
-                after = carried_from(clip, hand, gap.object, gap.end, gap.begin, contradicted, states);
+  Carried before = carried_from(clip, hand, gap.object, gap.begin, gap.end, contradicted, states),
+          after = carried_from(clip, hand, gap.object, gap.end, gap.begin, contradicted, states);
+  if (before.last < after.last) {
+    before.last = lowest(clip, before, gap.object, states);
+    after.last = lowest(clip, after, gap.object, states);
+  }
   lay_carried(clip, before, after, gap.object, states);
   return "frames " + std::to_string(gap.begin + 1) + " to " + std::to_string(gap.end - 1) + ": " +
          clip.objects[gap.object].name + ", of which more would show, " + carrier_text(clip, hand) + " to frame " +

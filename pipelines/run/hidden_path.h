@@ -3,7 +3,8 @@
 // With its carrier it moves evenly from where one frame shows it to where the other does. Frames may say that this is
 // wrong: more of the object would show there than does, as when it is put down behind something and the chest that it
 // went with stays above. Then the hand whose place the images know better carries it from both sides, as far as nothing
-// speaks against that, and in between it moves evenly.
+// speaks against that. If it does not get from one side to the other, the object was put down where that hand has it
+// lowest, and taken where it has it lowest on the other side. In between it moves evenly.
 #pragma once
 
 #include <cstddef>

@@ -1,9 +1,8 @@
 #include "pipelines/run/hidden_tracker.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
-
-#include "pipelines/run/hidden_path.h"
 
 namespace hsi4d {
 
@@ -96,6 +95,25 @@ void HiddenTracker::look_for_lost(At at, const ClipFrame& frame, const std::vect
   }
 }
 
+bool HiddenTracker::is_where_shown(std::size_t object, Index frame, const SceneState& state,
+                                   const ColorState& colors) const {
+  constexpr double kFirmIou = 0.8;
+  const std::optional<double> iou =
+      object_iou(picture_of_state(config_, clip_, state, colors), read_frame(clip_, frame), object);
+  return !iou || *iou >= kFirmIou;
+}
+
+HiddenGap HiddenTracker::gap_around(std::size_t object, Index last, Index next, const ColorState& colors,
+                                    const std::vector<SceneState>& states) const {
+  constexpr Index kMostDoubtful = 4;  // frames at an end
+  const auto is_firm = [&](Index t) { return is_where_shown(object, t, states[static_cast<std::size_t>(t)], colors); };
+  const Index first = std::max<Index>(0, last - kMostDoubtful),
+              final = std::min<Index>(clip_.frames() - 1, next + kMostDoubtful);
+  while (last > first && !is_hidden(last - 1, object) && !is_firm(last)) --last;
+  while (next < final && !is_hidden(next + 1, object) && !is_firm(next)) ++next;
+  return {object, static_cast<std::size_t>(last), static_cast<std::size_t>(next)};
+}
+
 void HiddenTracker::lay_hidden(const ColorState& colors, const std::vector<PlaceSigmas>& sigmas,
                                std::vector<SceneState>& states) const {
   for (std::size_t o = 0; is_on() && o < clip_.objects.size(); ++o) {
@@ -106,8 +124,8 @@ void HiddenTracker::lay_hidden(const ColorState& colors, const std::vector<Place
     for (Index t = 1; t < clip_.frames(); ++t) {
       const Index last = last_seen(t, o);
       if (is_hidden(t, o) || last == t - 1) continue;
-      const Carrier carrier = carrier_of(clip_, o, frames_with(o, last, states));
-      const HiddenGap gap{o, static_cast<std::size_t>(last), static_cast<std::size_t>(t)};
+      const HiddenGap gap = gap_around(o, last, t, colors, states);
+      const Carrier carrier = carrier_of(clip_, o, frames_with(o, static_cast<Index>(gap.begin), states));
       const std::string text = lay_gap(clip_, carrier, gap, contradicted, sigmas, states);
       if (!text.empty()) note_(text);
     }

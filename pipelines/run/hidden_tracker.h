@@ -9,7 +9,7 @@
 #include "pipelines/input/clip.h"
 #include "pipelines/input/color_state.h"
 #include "pipelines/input/state.h"
-#include "pipelines/run/hidden_objects.h"
+#include "pipelines/run/hidden_path.h"
 
 namespace hsi4d {
 
@@ -58,6 +58,11 @@ class HiddenTracker {
 
  private:
   bool is_hidden(Index frame, std::size_t object) const;
+  /// Whether what is drawn of it covers its mask: a frame that shows a sliver may leave it anywhere.
+  bool is_where_shown(std::size_t object, Index frame, const SceneState& state, const ColorState& colors) const;
+  /// The frames between two, and those beside them that do not have the object where it shows.
+  HiddenGap gap_around(std::size_t object, Index last, Index next, const ColorState& colors,
+                       const std::vector<SceneState>& states) const;
   Index last_seen(Index before, std::size_t object) const;
   std::vector<const SceneState*> frames_with(std::size_t object, Index last,
                                              const std::vector<SceneState>& states) const;

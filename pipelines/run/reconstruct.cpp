@@ -445,6 +445,7 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<SceneState> states = result();
     const StageTotals totals = run_over_sequence(later_stage() + l, states);
+    hidden_.lay_hidden(progress_.colors, progress_.sigmas, states);
     progress_.later.push_back({std::move(states), totals});
     progress_.seconds += seconds_since(begin);
   }

@@ -156,6 +156,7 @@ TEST_CASE("what frames say is not with the chest goes with the hand that images 
   std::vector<SceneState> states = walk(clip, {kRightWrist, 0, true}, held_by(clip, kRightWrist));
   while (states.size() < 10) states.push_back(moved(states.back(), 0.1, {0.02, 0.01, 0}));
   for (std::size_t t = 3; t < 7; ++t) states[t].body.set_rotation(19, Vector3<double>(0, 1.2, 0));  // the right elbow
+  for (std::size_t t = 3; t < 8; ++t) states[t].body.transl[2] -= 2;  // down, to where it is put
   const HiddenGap gap{0, 1, 8};
   states[8].objects[0] = carried_pose(clip, {kRightWrist, 0, true}, 0, states[1], states[8]);
   states[8].objects[0].translation += Vector3<double>(0.02, 0, 0);
