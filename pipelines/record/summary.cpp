@@ -259,6 +259,8 @@ std::string summary_json(const RunSummary& summary) {
   }
   tree.add("baselines", std::move(means));
   tree.add("per_frame", frames_json(summary.per_frame, "/per_frame"));
+  if (!summary.first_pass.empty())
+    tree.add("first_pass_per_frame", frames_json(summary.first_pass, "/first_pass_per_frame"));
   if (!by_frame.members.empty()) tree.add("baselines_per_frame", std::move(by_frame));
   return to_json(tree);
 }
@@ -295,6 +297,8 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
   read_baselines(tree, summary);
   if (const ConfigValue* const frames = find_member(tree, "per_frame"))
     summary.per_frame = read_frames(*frames, "/per_frame");
+  if (const ConfigValue* const frames = find_member(tree, "first_pass_per_frame"))
+    summary.first_pass = read_frames(*frames, "/first_pass_per_frame");
   return summary;
 }
 

@@ -73,7 +73,9 @@ struct RunSummary {
   std::vector<Baseline> baselines;
   std::vector<PersonSummary> people;    ///< beside the first one, whose errors are those of `metrics`
   std::vector<FrameMetrics> per_frame;  ///< of the result
-  std::vector<QualityGate> quality;     ///< of the result; may be empty
+  std::vector<FrameMetrics> first_pass =
+      {};                            ///< likewise, of what the first pass left; empty: none followed, or no truth
+  std::vector<QualityGate> quality;  ///< of the result; may be empty
 };
 
 /// The text of summary.json:
@@ -85,7 +87,8 @@ struct RunSummary {
 ///    "quality": {NAME: {"value", "word", "pass", "check"}...},
 ///    "people": {NAME: {"start": {NAME: NUMBER...}, "result": {NAME: NUMBER...}, "per_frame": as below}...},
 ///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
-///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "plate", "surface", "start",
+///    "first_pass_per_frame": likewise, "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}
+///                                                                          (the last two, "plate", "surface", "start",
 ///    "found", "quality", "people" and "gradient_shares" only where there are any)
 ///
 /// with "frame": 0 where errors are those of frame 0 alone.

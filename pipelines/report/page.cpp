@@ -243,6 +243,8 @@ std::string frame_errors_legend(const RunSummary& summary) {
             "\" style=\"border-color:" + baseline_color(baseline) + "\"></span>" + row_label(baseline.name) +
             (baseline.per_frame.empty() ? ", mean" : "") + "</span>";
   }
+  if (!summary.first_pass.empty())
+    text += "<span><span class=\"key\" style=\"border-color:var(--first)\"></span>first pass</span>";
   text += "<span><span class=\"key\" style=\"border-color:var(--result)\"></span>result</span>";
   if (has_sigmas(summary))
     text += "<span><span class=\"box\" style=\"background:var(--result);opacity:0.18\"></span>claimed sigma</span>";
@@ -265,6 +267,8 @@ std::string frame_errors_section(const RunSummary& summary) {
     for (const Baseline& baseline : summary.baselines) {
       if (!baseline.of_frame_0) plot.series.push_back(baseline_line(baseline, summary, facts.name));
     }
+    const Series first = frame_line("first pass", "var(--first)", summary.first_pass, facts.name);
+    if (!first.points.empty()) plot.series.push_back(first);
     plot.series.push_back(result);
     cards += "<div class=\"card\" title=\"" + html_escape(facts.summary) + "\"><h3>" + html_escape(facts.label) +
              (facts.unit.empty() ? "" : " [" + html_escape(facts.unit) + "]") + "</h3>" + plot_svg(plot) + "</div>\n";

@@ -74,8 +74,7 @@ void add_first_frame(const RunConfig& config, const Clip& clip, const RunProgres
 }
 
 /// Baselines and errors by frame, against the clip's truth.
-void add_errors(const Clip& clip, const std::vector<SceneState>& result, const ObjectPoints& points,
-                RunSummary& summary) {
+void add_errors(const Clip& clip, const RunProgress& progress, const ObjectPoints& points, RunSummary& summary) {
   const std::vector<FrameState> truth = placed(clip, *clip.truth, Draw::kAll);
   std::vector<SceneState> start, copy;
   for (Index t = 0; t < clip.frames(); ++t) {
@@ -86,7 +85,11 @@ void add_errors(const Clip& clip, const std::vector<SceneState>& result, const O
     summary.baselines.push_back({name, errors_of(clip, *states, Draw::kAll, points),
                                  sequence_errors(placed(clip, *states, Draw::kAll), truth, clip.frame_rate, &points)});
   }
-  summary.per_frame = sequence_errors(placed(clip, result, Draw::kAll), truth, clip.frame_rate, &points);
+  const auto by_frame = [&](const std::vector<SceneState>& states) {
+    return sequence_errors(placed(clip, states, Draw::kAll), truth, clip.frame_rate, &points);
+  };
+  summary.per_frame = by_frame(result_of(progress));
+  if (!progress.later.empty()) summary.first_pass = by_frame(progress.after_stage.back());
 }
 
 /// Adds errors of images, which need no truth, to means and frames.
@@ -327,7 +330,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
                                               totals));
   };
   if (clip.truth) {
-    add_errors(clip, result_of(progress), points, summary);
+    add_errors(clip, progress, points, summary);
   } else {
     summary.baselines = {{"start", motion_jitter(placed(clip, start_of(clip), Draw::kAll), clip.frame_rate), {}}};
   }

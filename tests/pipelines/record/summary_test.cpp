@@ -26,6 +26,7 @@ RunSummary small_summary() {
                        {"copy_frame_0", {{"mpjpe_mm", 20.01}}, {}}};
   summary.start = {0.25, {{"objects", {{"previous", 3}, {"estimate", 0}, {"velocity", 4}}}}};
   summary.per_frame = {{1, {{"mpjpe_mm", 10}}}, {2, {{"mpjpe_mm", 30.1}}}};
+  summary.first_pass = {{1, {{"mpjpe_mm", 12}}}, {2, {{"mpjpe_mm", 33}}}};
   summary.quality = {{"silhouette_iou", 0.75, 0.85, 0.7}, {"jitter", 3, 165, 330}};
   return summary;
 }
@@ -50,6 +51,8 @@ TEST_CASE("a summary reads back as it was written") {
   CHECK(back.baselines[0].per_frame.size() == 2);
   CHECK(*find_metric(back.per_frame[1].values, "mpjpe_mm") == 30.1);
   CHECK(find_metric(back.per_frame[1].values, "ssim") == nullptr);
+  REQUIRE(back.first_pass.size() == 2);
+  CHECK(*find_metric(back.first_pass[1].values, "mpjpe_mm") == 33);
   REQUIRE(back.quality.size() == 2);
   CHECK(back.quality[0].metric == "silhouette_iou");
   CHECK(back.quality[0].value == 0.75);

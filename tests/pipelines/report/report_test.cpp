@@ -477,6 +477,21 @@ TEST_CASE("how sure a run says that it is is shaded under its errors") {
   CHECK_THAT(text_between(depth, "<polygon points=\"", "\""), Contains(line));
 }
 
+TEST_CASE("errors by frame of the first pass stand beside those of the result") {
+  const TemporaryFolder here;
+  make_run("a", "first");
+  CHECK(report_html("a").find("first pass") == std::string::npos);
+  RunSummary summary = summary_named("first");
+  summary.first_pass = {{1, {{"mpjpe_mm", 15}}}, {2, {{"mpjpe_mm", 31.25}}}};
+  RunFolder folder("b", {"{}\n", 0, 1, "float"}, false);
+  folder.append_metrics({1, "camera", 0, 0.5, {}, 0.001});
+  folder.write_summary(summary);
+  const std::string page = report_html("b");
+  CHECK(tag_fault(page) == "");
+  CHECK_THAT(page, Contains("></span>first pass</span>"));
+  CHECK_THAT(page, Contains("<title>first pass, frame 2: 31.2 mm</title>"));
+}
+
 TEST_CASE("how sure joints and objects are is a table where the run says it") {
   const TemporaryFolder here;
   make_run("a", "first");

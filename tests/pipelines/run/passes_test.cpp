@@ -98,6 +98,10 @@ TEST_CASE("a stage over frames after one over the sequence goes through the fram
                                                           {"again", 3},
                                                           {"refinement_again", -1}});
   const nlohmann::json summary = json_of("run/summary.json");
+  double mean = 0;  // of the errors by frame that the first pass left
+  for (const nlohmann::json& frame : summary["first_pass_per_frame"]) mean += frame["mpjpe_mm"].get<double>() / kLater;
+  CHECK(mean == Approx(summary["metrics"][1]["mpjpe_mm"].get<double>()));
+  CHECK(summary["first_pass_per_frame"] != summary["per_frame"]);
   REQUIRE(summary["metrics"].size() == 6);
   CHECK(summary["metrics"][4]["stage"] == "again");
   CHECK(summary["metrics"][4]["iterations"] == 3 * kLater);
