@@ -7,6 +7,7 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "body/motion_edit.h"
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
@@ -86,8 +87,10 @@ std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const View
   for (const PosedView& view : set.views) {
     const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
     if (camera.width != first.width || camera.height != first.height) {
-      throw UserError(set.file.string() + ": camera " + std::to_string(view.camera) + " has " + size_text(camera) +
-                      " pixels, another " + size_text(first) + "; allowed: one size");
+      const std::string name =
+          set.photos.empty() ? "camera " + std::to_string(view.camera) : view.image.filename().string();
+      throw UserError(set.file.string() + ": " + name + " has " + size_text(camera) + " pixels, another " +
+                      size_text(first) + "; allowed: one size");
     }
     LoadedView& loaded = views.emplace_back();
     loaded.xi = se3_log(compose(camera.camera_from_world, inverse(first.camera_from_world)));
@@ -103,6 +106,11 @@ std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const View
     loaded.is_seen = !loaded.image.mask.empty() && shows_somebody(loaded.image.mask);
     loaded.held = is_held(settings, view);
   }
+  const auto unmasked =
+      std::count_if(views.begin(), views.end(), [](const LoadedView& view) { return view.image.mask.empty(); });
+  if (unmasked > 0 && !set.photos.empty())
+    log_warning(set.file.string() + ": " + std::to_string(unmasked) + " of " + std::to_string(views.size()) +
+                " photographs have neither alpha nor mask: what is behind the human becomes a part of it");
   return views;
 }
 
@@ -295,7 +303,9 @@ ViewScore score_of(FitGraph& graph, const std::vector<LoadedView>& views, bool h
     graph.show(view);
     const Image picture = graph.picture();
     ++score.views;
-    score.psnr_db += psnr_db(picture, view.image.color);
+    const Image& shown = view.image.weight;  // what the lens showed
+    score.psnr_db +=
+        shown.empty() ? psnr_db(picture, view.image.color) : psnr_db(picture, view.image.color, shown).value_or(0);
     const std::optional<double> foreground =
         view.is_seen ? psnr_db(picture, view.image.color, view.image.mask) : std::nullopt;
     if (!foreground) continue;

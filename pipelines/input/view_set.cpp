@@ -51,6 +51,9 @@ void describe(ConfigFields& f, ViewSetFile& s) {
   f.integer("longest_side", s.longest_side, {.min = 0, .max = 100000}, "Of photographs, px; 0: as they are");
   f.rule({"format"}, [&s] { return s.format == "hsi4d views" ? "" : "is not \"hsi4d views\""; });
   f.rule({"views"}, [&s] { return fault_of_pictures(s); });
+  const std::string alone = "is of photographs; there is no /photos";
+  f.rule({"frame"}, [&s, alone] { return s.photos.empty() && s.frame != 0 ? alone : ""; });
+  f.rule({"longest_side"}, [&s, alone] { return s.photos.empty() && s.longest_side != 0 ? alone : ""; });
   f.rule({"cameras"}, [&s] { return s.photos.empty() && s.cameras.empty() ? "not given" : ""; });
 }
 
@@ -98,9 +101,12 @@ ViewImage image_of_photo(const PosedImage& posed, const PhotoRules& rules) {
 
 /// Every photograph becomes a view of the same frame.
 void add_photos(const ViewSetFile& read, ViewSet& set) {
-  set.photos = read_posed_images(read.photos).images;
+  PosedImages found = read_posed_images(read.photos);
+  set.photos = std::move(found.images);
+  set.cameras_file = found.file;
   set.photo_rules.longest_side = read.longest_side;
-  for (const PosedImage& photo : set.photos) {
+  for (PosedImage& photo : set.photos) {
+    photo.depth.clear();  // nobody asks for it
     set.views.push_back({photo.image, photo.mask, std::ssize(set.cameras), read.frame});
     set.cameras.push_back(photo_camera(photo, set.photo_rules));
   }

@@ -66,17 +66,6 @@ double spread_with(const Clip& clip, const Carrier& carrier, std::size_t object,
   return spread_of(places);
 }
 
-bool is_touched(const Clip& clip, std::size_t object, std::size_t person, const SceneState& state) {
-  const Avatar& avatar = clip.person(person).avatar;
-  const ObjectCentres centres({&clip.objects[object].gaussians});
-  const std::array<Rigid<double>, 1> pose = {rigid_of(state.objects[object])};
-  const std::vector<double> joints = pose_joints(avatar, state.person(person));
-  for (Index j = 0; 3 * j < std::ssize(joints); ++j) {
-    if (is_hand_joint(j) && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance)) return true;
-  }
-  return false;
-}
-
 double image_difference(const RunConfig& config, const Clip& clip, const SceneState& state, const ClipFrame& frame,
                         const ColorState& colors) {
   const Image image = render_state(config, clip, state, colors);
@@ -130,12 +119,25 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
   return shown_share(clip, mask_center(picture.objects.at(object), 0)[2], object, state);
 }
 
+std::array<bool, 2> touching_hands(const Clip& clip, std::size_t object, std::size_t person, const SceneState& state) {
+  const ObjectCentres centres({&clip.objects[object].gaussians});
+  const std::array<Rigid<double>, 1> pose = {rigid_of(state.objects[object])};
+  const std::vector<double> joints = pose_joints(clip.person(person).avatar, state.person(person));
+  std::array<bool, 2> touching = {};
+  for (Index j = 0; 3 * j < std::ssize(joints); ++j) {
+    const std::optional<std::size_t> hand = hand_of_joint(j);
+    if (hand && centres.nearest(Vector(joints.data() + 3 * j), pose, kContactDistance)) touching[*hand] = true;
+  }
+  return touching;
+}
+
 Carrier carrier_of(const Clip& clip, std::size_t object, const std::vector<const SceneState*>& seen) {
   const std::span<const SceneState* const> last = std::span(seen).last(std::min(kFramesOfCarrier, seen.size()));
   Carrier best;
   double least = spread_with(clip, best, object, last) + kHandShift;
   for (std::size_t p = 0; p < clip.people(); ++p) {
-    if (!is_touched(clip, object, p, *last.back())) continue;
+    const std::array<bool, 2> touching = touching_hands(clip, object, p, *last.back());
+    if (!touching[0] && !touching[1]) continue;
     const Carrier person{kChest, p};
     const double spread = spread_with(clip, person, object, last);
     if (!(spread < least)) continue;

@@ -6,6 +6,7 @@
 // may be, by rendering; and what lies between two frames that show it is laid on a smooth path between them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -51,6 +52,9 @@ double drawn_share(const Clip& clip, const StatePicture& picture, std::size_t ob
 /// the object, whatever a mask says that may be missing.
 bool is_shown_at(const RunConfig& config, const Clip& clip, std::size_t object, const ClipFrame& frame,
                  const SceneState& state, const ColorState& colors);
+
+/// Which hands of a person touch an object: left, right.
+std::array<bool, 2> touching_hands(const Clip& clip, std::size_t object, std::size_t person, const SceneState& state);
 
 /// The chest of a person whose hand the object touched in the last frame that shows it, if in the last frames that do
 /// it moved with the chest at least as well as it stood in the world; of several the one that it moved with best; else

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <optional>
 
 #include "core/rigid.h"
 #include "core/rotation.h"
@@ -27,15 +29,26 @@ Rigid<double> between(const Rigid<double>& from, const Rigid<double>& to, double
 /// The frame nearer to `to` by one.
 std::size_t next_to(std::size_t frame, std::size_t to) { return frame < to ? frame + 1 : frame - 1; }
 
-/// The hand whose wrist images know better while the object is hidden.
-Carrier known_hand(const HiddenGap& gap, std::size_t person, const std::vector<PlaceSigmas>& sigmas) {
-  std::array<double, kWristJoints.size()> doubts = {};
-  for (std::size_t t = gap.begin + 1; t < gap.end; ++t) {
-    const std::vector<PlaceSigma>& joints = person == 0 ? sigmas[t].joints : sigmas[t].others.at(person - 1);
-    for (std::size_t hand = 0; hand < doubts.size(); ++hand)
-      doubts[hand] += joints.at(static_cast<std::size_t>(kWristJoints[hand])).across;
+/// Of the hands that touch the object at an end of the gap the one whose wrist images know better while it is hidden;
+/// none where they tell of none.
+std::optional<Carrier> known_hand(const Clip& clip, const HiddenGap& gap, std::size_t person,
+                                  const std::vector<PlaceSigmas>& sigmas, const std::vector<SceneState>& states) {
+  const std::array<bool, 2> before = touching_hands(clip, gap.object, person, states[gap.begin]),
+                            after = touching_hands(clip, gap.object, person, states[gap.end]);
+  std::optional<Carrier> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t hand = 0; hand < kWristJoints.size(); ++hand) {
+    if (!before[hand] && !after[hand]) continue;
+    double sum = 0;
+    for (std::size_t t = gap.begin + 1; t < gap.end; ++t) {
+      const std::vector<PlaceSigma>& joints = person == 0 ? sigmas[t].joints : sigmas[t].others.at(person - 1);
+      sum += joints.at(static_cast<std::size_t>(kWristJoints[hand])).across;
+    }
+    if (!(sum < least)) continue;  // one that is not known in some frame is infinite, or not a number
+    least = sum;
+    best = Carrier{kWristJoints[hand], person, true};
   }
-  return {kWristJoints[doubts[1] < doubts[0] ? 1 : 0], person, true};
+  return best;
 }
 
 /// How far a hand gets into a gap from one of its ends.
@@ -102,17 +115,24 @@ std::string lay_gap(const Clip& clip, const Carrier& carrier, const HiddenGap& g
   bool is_wrong = false;
   for (std::size_t t = gap.begin + 1; t < gap.end; ++t) is_wrong = is_wrong || contradicted(t, states[t]);
   if (!is_wrong) return "";
-  const Carrier hand = known_hand(gap, carrier.person, sigmas);
-  Carried before = carried_from(clip, hand, gap.object, gap.begin, gap.end, contradicted, states),
-          after = carried_from(clip, hand, gap.object, gap.end, gap.begin, contradicted, states);
-  if (before.last < after.last) {
+  const std::string text = "frames " + std::to_string(gap.begin + 1) + " to " + std::to_string(gap.end - 1) +
+                           ": more of " + clip.objects[gap.object].name + " would show than does; it ";
+  const std::string stays = carrier_text(clip, carrier) + " all the same, as no hand that is known goes elsewhere";
+  const std::optional<Carrier> hand = known_hand(clip, gap, carrier.person, sigmas, states);
+  if (!hand) return text + stays;
+  Carried before = carried_from(clip, *hand, gap.object, gap.begin, gap.end, contradicted, states),
+          after = carried_from(clip, *hand, gap.object, gap.end, gap.begin, contradicted, states);
+  if (before.last == gap.begin && after.last == gap.end) return text + stays;
+  const bool is_carried = before.last + 1 >= after.last;
+  if (!is_carried) {
     before.last = lowest(clip, before, gap.object, states);
     after.last = lowest(clip, after, gap.object, states);
   }
   lay_carried(clip, before, after, gap.object, states);
-  return "frames " + std::to_string(gap.begin + 1) + " to " + std::to_string(gap.end - 1) + ": " +
-         clip.objects[gap.object].name + ", of which more would show, " + carrier_text(clip, hand) + " to frame " +
-         std::to_string(before.last) + " and from frame " + std::to_string(after.last);
+  return text + carrier_text(clip, *hand) +
+         (is_carried ? ""
+                     : ", is put down in frame " + std::to_string(before.last) + " and taken in frame " +
+                           std::to_string(after.last));
 }
 
 }  // namespace hsi4d

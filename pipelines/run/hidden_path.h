@@ -2,9 +2,10 @@
 //
 // With its carrier it moves evenly from where one frame shows it to where the other does. Frames may say that this is
 // wrong: more of the object would show there than does, as when it is put down behind something and the chest that it
-// went with stays above. Then the hand whose place the images know better carries it from both sides, as far as nothing
-// speaks against that. If it does not get from one side to the other, the object was put down where that hand has it
-// lowest, and taken where it has it lowest on the other side. In between it moves evenly.
+// went with stays above. Then a hand carries it from both sides, as far as nothing speaks against that: of those that
+// touch it at an end the one whose place the images know better. If it does not get from one side to the other, the
+// object was put down where that hand has it lowest, and taken where it has it lowest on the other side. In between it
+// moves evenly.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +19,9 @@
 
 namespace hsi4d {
 
-/// Frames that hide an object, between two that show it.
+/// Frames that hide an object, or show too little of it to tell where it is, between two that show it.
 struct HiddenGap {
-  std::size_t object = 0, begin = 0, end = 0;  ///< `begin` and `end` show it
+  std::size_t object = 0, begin = 0, end = 0;
 };
 
 /// Whether a frame cannot have the object where a state has it.

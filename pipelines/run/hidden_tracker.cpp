@@ -103,11 +103,11 @@ bool HiddenTracker::is_where_shown(std::size_t object, Index frame, const SceneS
   return !iou || *iou >= kFirmIou;
 }
 
-HiddenGap HiddenTracker::gap_around(std::size_t object, Index last, Index next, const ColorState& colors,
+HiddenGap HiddenTracker::gap_around(std::size_t object, Index least, Index last, Index next, const ColorState& colors,
                                     const std::vector<SceneState>& states) const {
   constexpr Index kMostDoubtful = 4;  // frames at an end
   const auto is_firm = [&](Index t) { return is_where_shown(object, t, states[static_cast<std::size_t>(t)], colors); };
-  const Index first = std::max<Index>(0, last - kMostDoubtful),
+  const Index first = std::max(least, last - kMostDoubtful),
               final = std::min<Index>(clip_.frames() - 1, next + kMostDoubtful);
   while (last > first && !is_hidden(last - 1, object) && !is_firm(last)) --last;
   while (next < final && !is_hidden(next + 1, object) && !is_firm(next)) ++next;
@@ -121,10 +121,12 @@ void HiddenTracker::lay_hidden(const ColorState& colors, const std::vector<Place
       const double drawn = drawn_share(clip_, picture_of_state(config_, clip_, state, colors), o, state);
       return drawn >= seen_[t][o] + kHiddenBelow;
     };
+    Index least = 0;
     for (Index t = 1; t < clip_.frames(); ++t) {
       const Index last = last_seen(t, o);
       if (is_hidden(t, o) || last == t - 1) continue;
-      const HiddenGap gap = gap_around(o, last, t, colors, states);
+      const HiddenGap gap = gap_around(o, least, last, t, colors, states);
+      least = static_cast<Index>(gap.end);
       const Carrier carrier = carrier_of(clip_, o, frames_with(o, static_cast<Index>(gap.begin), states));
       const std::string text = lay_gap(clip_, carrier, gap, contradicted, sigmas, states);
       if (!text.empty()) note_(text);

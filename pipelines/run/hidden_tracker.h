@@ -51,7 +51,7 @@ class HiddenTracker {
                      const ColorState& colors, SceneState& state) const;
 
   /// Between two frames that show it a hidden object is on a smooth path (hidden_path.h).
-  /// @param sigmas  by frame, where they are known
+  /// @param sigmas  by frame; none: hidden objects go with the chest or stay, whatever frames say
   /// @param states  of all frames
   void lay_hidden(const ColorState& colors, const std::vector<PlaceSigmas>& sigmas,
                   std::vector<SceneState>& states) const;
@@ -60,8 +60,9 @@ class HiddenTracker {
   bool is_hidden(Index frame, std::size_t object) const;
   /// Whether what is drawn of it covers its mask: a frame that shows a sliver may leave it anywhere.
   bool is_where_shown(std::size_t object, Index frame, const SceneState& state, const ColorState& colors) const;
-  /// The frames between two, and those beside them that do not have the object where it shows.
-  HiddenGap gap_around(std::size_t object, Index last, Index next, const ColorState& colors,
+  /// The frames between `last` and `next`, and up to four at each side that do not have the object where it shows.
+  /// @param least  the first frame that may begin it
+  HiddenGap gap_around(std::size_t object, Index least, Index last, Index next, const ColorState& colors,
                        const std::vector<SceneState>& states) const;
   Index last_seen(Index before, std::size_t object) const;
   std::vector<const SceneState*> frames_with(std::size_t object, Index last,

@@ -145,7 +145,7 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
-    if (progress_.later.empty()) hidden_.lay_hidden(progress_.colors, progress_.sigmas, progress_.after_stage.back());
+    if (progress_.later.empty()) lay_hidden(progress_.after_stage.back());
     if (config_.remove_depth_bias && !progress_.bias) remove_bias();
     if (has_later()) {
       run_later_stages();
@@ -406,10 +406,8 @@ class Reconstruction {
     const DepthBias bias = depth_bias(clip_, frame, config_.data.mask_threshold, clip_.first, fitted);
     folder_.note("frame 0, fitted too: distances times " + depth_bias_text(clip_, bias) +
                  "; taken from all later frames");
-    std::vector<SceneState>& states = progress_.after_stage.back();
-    for (Index t = 1; t < clip_.frames(); ++t)
-      hsi4d::remove_depth_bias(clip_, bias, states[static_cast<std::size_t>(t)]);
     progress_.bias = bias;
+    take_bias(progress_.after_stage.back());
   }
 
   /// Images of all frames but the given one, and their errors.
@@ -445,7 +443,9 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<SceneState> states = result();
     const StageTotals totals = run_over_sequence(later_stage() + l, states);
-    hidden_.lay_hidden(progress_.colors, progress_.sigmas, states);
+    give_bias(states);
+    lay_hidden(states);
+    take_bias(states);
     progress_.later.push_back({std::move(states), totals});
     progress_.seconds += seconds_since(begin);
   }
@@ -464,9 +464,9 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     const ClipFrame frame = read_frame(clip_, index);
     std::vector<SceneState> done = progress_.later[end - 1].states;
-    for (std::size_t t = 1; t < done.size(); ++t) give_bias(done[t]);
+    give_bias(done);
     std::vector<SceneState> biased = states_before(l);
-    for (std::size_t t = 1; t < biased.size(); ++t) give_bias(biased[t]);
+    give_bias(biased);
     const std::span<const SceneState> after = std::span(biased).subspan(static_cast<std::size_t>(index) + 1);
     SceneState state = biased[static_cast<std::size_t>(index)];
     progress_.colors.nets = colors_after(index).nets;
@@ -487,15 +487,27 @@ class Reconstruction {
     if (events_) events_->end_frame(index);
   }
 
-  /// What images pull a state to, before the bias was taken from it.
-  void give_bias(SceneState& state) const {
+  /// What images pull states of frames after the first to, before the bias was taken from them.
+  void give_bias(std::vector<SceneState>& states) const {
     if (!progress_.bias) return;
     DepthBias inverse = *progress_.bias;
     inverse.human = 1 / inverse.human;
     for (auto* factors : {&inverse.objects, &inverse.others}) {
       for (double& factor : *factors) factor = 1 / factor;
     }
-    hsi4d::remove_depth_bias(clip_, inverse, state);
+    for (std::size_t t = 1; t < states.size(); ++t) hsi4d::remove_depth_bias(clip_, inverse, states[t]);
+  }
+
+  void take_bias(std::vector<SceneState>& states) const {
+    for (std::size_t t = 1; progress_.bias && t < states.size(); ++t)
+      hsi4d::remove_depth_bias(clip_, *progress_.bias, states[t]);
+  }
+
+  /// @param states  of all frames, as images pull them
+  void lay_hidden(std::vector<SceneState>& states) const {
+    const bool is_asked = std::any_of(config_.stages.begin(), config_.stages.end(),
+                                      [](const auto& stage) { return weighs_by_sigma(stage.second); });
+    hidden_.lay_hidden(progress_.colors, is_asked ? progress_.sigmas : std::vector<PlaceSigmas>{}, states);
   }
 
   /// Where a later stage begins, by frame.

@@ -112,9 +112,9 @@ float median_depth(const Photo& photo) {
   return median(std::move(known));
 }
 
-/// A camera within a wall or a thing sees the inside of its surface, far nearer than what the others see.
+/// A camera within a wall or a thing sees the inside of its surface, far nearer than what most cameras see.
 void tell_inside(const PosedImages& set, const std::vector<Photo>& photos) {
-  constexpr float kInside = 0.02F;  // of the others' median depth
+  constexpr float kInside = 0.02F;  // of the median of all pictures' median depths
   std::vector<float> depths, known;
   for (const Photo& photo : photos) depths.push_back(photo.depth.empty() ? 0 : median_depth(photo));
   std::copy_if(depths.begin(), depths.end(), std::back_inserter(known), [](float z) { return z > 0; });
@@ -126,7 +126,7 @@ void tell_inside(const PosedImages& set, const std::vector<Photo>& photos) {
   if (inside.empty()) return;
   log_warning(set.file.string() + ": half of what " + std::to_string(inside.size()) + " of " +
               std::to_string(photos.size()) + " pictures show is nearer than " + rounded(kInside * usual, 2) +
-              ", the others look " + rounded(usual, 2) + " far: cameras in a wall? " + few_names(inside));
+              ", the median of all is " + rounded(usual, 2) + ": cameras in a wall? " + few_names(inside));
 }
 
 std::string size_of(const fs::path& file) { return file.empty() ? "-" : std::to_string(fs::file_size(file)); }

@@ -286,11 +286,29 @@ TEST_CASE("photographs whose cameras another program found are views of one fram
   write(R"(, "k1": 0.3)");  // straightened: its corners are of no pixel
   const ViewSet bent = read_view_set(views_json(R"(, "frame": 1)"));
   const ViewImage straight = view_image(bent, bent.views[0], {0, 0, 1});
+  CHECK(straight.weight(0, 0, 0) == 0);
   CHECK(straight.weight(0, 48, 48) == 1);
   CHECK(straight.mask(0, 48, 48) == 1);
   CHECK_THROWS_WITH(read_view_set(views_json(R"(, "frame": 2)")), Catch::Contains("json: /frame: 2; there are 2"));
   CHECK_THROWS_WITH(read_view_set(views_json(R"(, "cameras": "transforms.json")")),
                     Catch::Contains("photographs have cameras of their own"));
+}
+
+TEST_CASE("settings of photographs are refused where there are none") {
+  const ScratchFolder folder;
+  fs::copy(made_views().parent_path(), folder / "views", fs::copy_options::recursive);
+  const fs::path file = folder / "views/views.json";
+  const auto with = [&](const std::string& more) {
+    write_text_file(file, R"({"format": "hsi4d views", "version": 1, "motion": "motion.npz", )" + more + "}");
+    return file;
+  };
+  const std::string some =
+      R"("cameras": "cameras.json", "views": [{"image": "images/0000.png", "camera": 0, "frame": 0}])";
+  CHECK_NOTHROW(read_view_set(with(some)));
+  CHECK_THROWS_WITH(read_view_set(with(some + R"(, "longest_side": 48)")),
+                    Catch::Contains("/longest_side: is of photographs; there is no /photos"));
+  CHECK_THROWS_WITH(read_view_set(with(some + R"(, "frame": 1)")), Catch::Contains("/frame: is of photographs"));
+  CHECK_THROWS_WITH(read_view_set(with(R"("cameras": "cameras.json")")), Catch::Contains("there is no view"));
 }
 
 TEST_CASE("an avatar fit refuses what it cannot do, and stops when asked") {
