@@ -208,6 +208,7 @@ MeshDistance::MeshDistance(const TriangleMesh& mesh, double thickness) {
   HSI4D_CHECK(!mesh.faces.empty(), "the mesh has no faces");
   for (TriangleMesh& solid : solids_of(mesh)) {
     pieces_.push_back(std::make_unique<const Piece>(std::move(solid), thickness));
+    if (pieces_.back()->is_open) thickest_slab_ = thickness;
   }
 }
 

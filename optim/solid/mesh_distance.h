@@ -44,9 +44,14 @@ class MeshDistance {
   /// Throws InternalError for a point that is not finite.
   double at(const Vector3<double>& point) const;
 
+  /// No place nearer than this to one at that distance is in the solid; 0 or less: there may be one. Closed pieces end
+  /// where their surface is; behind the border of an open one its slab begins, as deep as it is thick.
+  double free_radius(double distance) const { return distance - thickest_slab_; }
+
  private:
   struct Piece;
   std::vector<std::unique_ptr<const Piece>> pieces_;
+  double thickest_slab_ = 0;
 };
 
 /// Reads a mesh and its distance. An open mesh, and one whose pieces are all turned inwards, is told in the log.

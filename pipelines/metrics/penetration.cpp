@@ -1,6 +1,7 @@
 #include "pipelines/metrics/penetration.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "core/check.h"
 #include "core/parallel.h"
@@ -29,6 +30,32 @@ Penetration counted(Index count, const F& distance_at) {
   }
   return counts;
 }
+
+/// Distances of points that move from frame to frame. A point that has gone less far than it was from anything solid is
+/// still free: most are, and only the others are looked at.
+class FollowedPoints {
+ public:
+  FollowedPoints(const MeshDistance& surface, std::size_t count) : surface_(surface), free_(count) {}
+
+  /// Of point p; where it cannot be below 0 maybe an older one. Several threads may ask for different points.
+  double distance_of(Index p, const Vector3<double>& place) {
+    FreeBall& ball = free_[static_cast<std::size_t>(p)];
+    if ((place - ball.center).norm() < ball.radius) return ball.radius;
+    const double distance = surface_.at(place);
+    ball = {place, distance > 0 ? surface_.free_radius(distance) : 0};
+    return distance;
+  }
+
+ private:
+  /// Nothing solid is in it.
+  struct FreeBall {
+    Vector3<double> center = Vector3<double>::Zero();
+    double radius = 0;
+  };
+
+  const MeshDistance& surface_;
+  std::vector<FreeBall> free_;
+};
 
 MetricValues values_of(const Penetration& counts, const std::string& before) {
   const double share = counts.points > 0 ? static_cast<double>(counts.inside) / static_cast<double>(counts.points) : 0;
@@ -77,10 +104,14 @@ Penetration penetration_of(const std::vector<SignedDistance>& distances,
 
 std::vector<Penetration> penetration_by_frame(const Clip& clip, const std::vector<SceneState>& states) {
   HSI4D_CHECK(clip.surface != nullptr, "the clip has no surface");
-  const SignedDistance distance = [&clip](const Vector3<double>& place) { return clip.surface->at(place); };
   std::vector<Penetration> by_frame;
-  for (const SceneState& state : states)
-    by_frame.push_back(penetration_of(distance, measured_points(clip.avatar, state.body)));
+  std::optional<FollowedPoints> followed;
+  for (const SceneState& state : states) {
+    const std::vector<double> points = measured_points(clip.avatar, state.body);
+    if (!followed) followed.emplace(*clip.surface, points.size() / 3);
+    by_frame.push_back(
+        counted(std::ssize(points) / 3, [&](Index p) { return followed->distance_of(p, point_at(points, p)); }));
+  }
   return by_frame;
 }
 

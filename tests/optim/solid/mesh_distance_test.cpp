@@ -114,6 +114,28 @@ TEST_CASE("what is unknown behind an open mesh does not hide a solid") {
   CHECK(std::isnan(distance.at({0, 0, -0.15})));
 }
 
+TEST_CASE("nothing within the free radius of a place is solid") {
+  TriangleMesh open = box_mesh(kLow, kHigh);
+  open.faces.pop_back();  // half of a side is open: behind the others is a slab
+  for (const TriangleMesh& mesh : {box_mesh(kLow, kHigh), open}) {
+    const MeshDistance distance(cleaned(mesh, "box"), 0.1);
+    RandomSequence random(4);
+    int tried = 0, beside = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const Point p = random_point(random, 1.2);
+      const double d = distance.at(p), radius = d > 0 ? distance.free_radius(d) : 0;
+      if (!(radius > 0)) continue;
+      const Point way = random_point(random, 1);
+      const Point q = p + way / way.norm() * radius * random.uniform(0.9, 1);
+      ++tried;
+      CHECK_FALSE(distance.at(q) < 0);
+      beside += distance.at(p + way / way.norm() * (d + 0.02)) < 0 ? 1 : 0;
+    }
+    CHECK(tried > 1000);
+    CHECK(beside > 10);  // a little farther it may be
+  }
+}
+
 TEST_CASE("a mesh that is not closed, or turned inwards, is told in the log") {
   const ScratchFolder folder;
   std::vector<std::string> told;

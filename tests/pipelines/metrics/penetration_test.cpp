@@ -101,6 +101,32 @@ TEST_CASE("penetration counts the human's Gaussians in the solid, and how deep t
   CHECK(penetration_values({.points = 7})[1].second == 0);
 }
 
+TEST_CASE("points that are followed from frame to frame count as each frame alone does") {
+  const Clip clip = read_clip(tiny_config().data);
+  std::vector<SceneState> states = {clip.first};
+  RandomSequence random(7);
+  for (int t = 0; t < 60; ++t) {  // steps of centimetres and of half a metre, also into the ground
+    SceneState next = states.back();
+    const double step = t % 10 == 9 ? 0.5 : 0.03;
+    for (Index i = 0; i < 3; ++i) next.body.transl[i] += random.uniform(-step, step);
+    next.body.transl[2] = clip.first.body.transl[2] - 0.3 + 0.35 * std::sin(0.5 * t);
+    next.body.set_rotation(0, next.body.rotation_of(0) + Vector3<double>(0, 0.02, 0.05));
+    states.push_back(next);
+  }
+  const SignedDistance distance = [&](const Vector3<double>& place) { return clip.surface->at(place); };
+  const std::vector<Penetration> followed = penetration_by_frame(clip, states);
+  Index inside = 0;
+  for (std::size_t t = 0; t < states.size(); ++t) {
+    const Penetration alone = penetration_of(distance, measured_points(clip.avatar, states[t].body));
+    CAPTURE(t);
+    CHECK(followed[t].points == alone.points);
+    CHECK(followed[t].inside == alone.inside);
+    CHECK(followed[t].depth == alone.depth);
+    inside += alone.inside;
+  }
+  CHECK(inside > 1000);
+}
+
 TEST_CASE("a run with the loss penetration has the body less in the ground, and says so", "[release]") {
   const TemporaryFolder folder;
   const auto depth = [&](const char* name, const std::string& weight, std::vector<std::string> overrides) {
