@@ -3,10 +3,12 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/mask_image.h"
 #include "core/size_text.h"
 #include "pipelines/input/body_files.h"
+#include "pipelines/photos/alignment.h"
 
 namespace hsi4d {
 
@@ -20,7 +22,7 @@ struct ViewSetFile {
   int version = kViewSetVersion;
   fs::path motion, cameras;
   std::vector<PosedView> views;
-  fs::path photos;
+  fs::path photos, alignment;
   Index frame = 0;
   int longest_side = 0;
 };
@@ -47,14 +49,17 @@ void describe(ConfigFields& f, ViewSetFile& s) {
   f.path("cameras", s.cameras, {.must_exist = true}, "Cameras");
   f.list("views", s.views, "Pictures", [](ConfigFields& inner, PosedView& view) { describe(inner, view); });
   f.path("photos", s.photos, {.must_exist = true}, "Photographs with cameras, in place of cameras and views");
+  f.path("alignment", s.alignment, {.must_exist = true},
+         "alignment.json of hsi4d align, from their world to the motion's");
   f.integer("frame", s.frame, {.min = 0}, "The frame of the motion that photographs show");
   f.integer("longest_side", s.longest_side, {.min = 0, .max = 100000}, "Of photographs, px; 0: as they are");
   f.rule({"format"}, [&s] { return s.format == "hsi4d views" ? "" : "is not \"hsi4d views\""; });
-  f.rule({"views"}, [&s] { return fault_of_pictures(s); });
+  f.rule({"views", "photos"}, [&s] { return fault_of_pictures(s); });
   const std::string alone = "is of photographs; there is no /photos";
-  f.rule({"frame"}, [&s, alone] { return s.photos.empty() && s.frame != 0 ? alone : ""; });
-  f.rule({"longest_side"}, [&s, alone] { return s.photos.empty() && s.longest_side != 0 ? alone : ""; });
-  f.rule({"cameras"}, [&s] { return s.photos.empty() && s.cameras.empty() ? "not given" : ""; });
+  f.rule({"frame", "photos"}, [&s, alone] { return s.photos.empty() && s.frame != 0 ? alone : ""; });
+  f.rule({"alignment", "photos"}, [&s, alone] { return s.photos.empty() && !s.alignment.empty() ? alone : ""; });
+  f.rule({"longest_side", "photos"}, [&s, alone] { return s.photos.empty() && s.longest_side != 0 ? alone : ""; });
+  f.rule({"cameras", "photos"}, [&s] { return s.photos.empty() && s.cameras.empty() ? "not given" : ""; });
 }
 
 /// Throws UserError unless camera and frame of every view are there.
@@ -105,8 +110,12 @@ void add_photos(const ViewSetFile& read, ViewSet& set) {
   set.photos = std::move(found.images);
   set.cameras_file = found.file;
   set.photo_rules.longest_side = read.longest_side;
+  Similarity to_motion;
+  if (!read.alignment.empty())
+    to_motion = decode_alignment(read_text_file(read.alignment.string()), read.alignment.string());
   for (PosedImage& photo : set.photos) {
     photo.depth.clear();  // nobody asks for it
+    photo.camera = moved_camera(photo.camera, to_motion);
     set.views.push_back({photo.image, photo.mask, std::ssize(set.cameras), read.frame});
     set.cameras.push_back(photo_camera(photo, set.photo_rules));
   }

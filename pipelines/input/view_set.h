@@ -14,7 +14,8 @@
 //   {"format": "hsi4d views", "version": 1, "motion": "motion.npz", "photos": "colmap", "frame": 0, "longest_side":
 //   960}
 //
-// with `photos` as read_posed_images reads it (pipelines/photos/posed_images.h), in the world of the motion.
+// with `photos` as read_posed_images reads it (pipelines/photos/posed_images.h), in the world of the motion, or in one
+// that `alignment`, the alignment.json of `hsi4d align`, takes there.
 #pragma once
 
 #include <filesystem>
@@ -59,8 +60,8 @@ struct ViewSet {
   std::vector<std::filesystem::path> files() const;
 };
 
-/// Reads a set. Throws UserError naming file, JSON pointer, value and what is allowed; as read_motion, read_cameras and
-/// read_posed_images.
+/// Reads a set. Throws UserError naming file, JSON pointer, value and what is allowed; as read_motion, read_cameras,
+/// read_posed_images and decode_alignment.
 ViewSet read_view_set(const std::filesystem::path& file);
 
 /// Text of views.json for views whose paths are relative to it already.

@@ -4,8 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/camera.h"
-#include "splat/files/transform.h"
+#include "pipelines/photos/alignment.h"
 
 namespace hsi4d {
 
@@ -17,10 +16,5 @@ namespace hsi4d {
 /// Throws UserError naming the folder: no model, no such picture or several, a lens that bends; DataError as
 /// read_colmap.
 Camera colmap_camera(const std::filesystem::path& folder, const std::string& picture, const Similarity& alignment);
-
-/// The similarity of alignment.json, which `hsi4d align` writes: `matrix` has rows [s R, t].
-/// @param name  what messages call it
-/// Throws UserError naming file, place, value and what is allowed: no such JSON; as similarity_from_matrix.
-Similarity decode_alignment(const std::string& text, const std::string& name);
 
 }  // namespace hsi4d

@@ -152,15 +152,6 @@ double height_over(const GroundPlane& ground, const Vector3<double>& point) {
   return ground.up.dot(point) - ground.height;
 }
 
-Camera moved_camera(const Camera& camera, const Similarity& similarity) {
-  const Rigid<double>& old = camera.camera_from_world;
-  Camera moved = camera;
-  moved.camera_from_world.rotation = old.rotation * similarity.rotation.transpose();
-  moved.camera_from_world.translation =
-      similarity.scale * old.translation - moved.camera_from_world.rotation * similarity.translation;
-  return moved;
-}
-
 void draw_ground_grid(const Camera& camera, std::span<const double> depth, Image& image) {
   constexpr double kReach = 5, kWidth = 0.015, kHidden = 0.25, kRoom = 0.03;  // metres; share of the colour; metres
   constexpr std::array<float, 3> kColor = {1, 0.85F, 0};

@@ -8,7 +8,7 @@
 
 #include "core/camera.h"
 #include "core/image.h"
-#include "splat/files/transform.h"
+#include "pipelines/photos/alignment.h"
 #include "splat/gaussians.h"
 
 namespace hsi4d {
@@ -45,9 +45,6 @@ Similarity alignment(const GroundPlane& ground, double scale, const Vector3<doub
 
 /// Height of a point over the ground, in the units of its world.
 double height_over(const GroundPlane& ground, const Vector3<double>& point);
-
-/// The camera that sees the moved world as it saw the other: its depths are `scale` times as large.
-Camera moved_camera(const Camera& camera, const Similarity& similarity);
 
 /// Draws a grid of metres, up to 5 m around the origin, at z = 0 over a picture: bright where nothing is before it.
 /// @param image  [3,H,W]; @param depth  [H,W], camera z, 0: nothing

@@ -10,12 +10,14 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/parallel.h"
+#include "core/rotation.h"
 #include "core/text.h"
 #include "optim/metrics.h"
 #include "pipelines/avatar/offsets.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/draw/posed_avatar.h"
 #include "pipelines/input/body_files.h"
+#include "pipelines/photos/alignment.h"
 #include "pipelines/synthetic/dataset.h"
 #include "pipelines/synthetic/views.h"
 #include "stress/scratch_folder.h"
@@ -231,14 +233,14 @@ TEST_CASE("a picture's alpha is its mask, and views that make no sense are refus
 TEST_CASE("photographs whose cameras another program found are views of one frame") {
   const ScratchFolder folder;
   const ViewSet made = read_view_set(made_views());
-  const auto write = [&](const std::string& lens) {
+  const auto write = [&](const std::string& lens, const Similarity& away = {}) {
     std::string frames;
     fs::create_directories(folder / "images");
     for (const PosedView& view : made.views) {
       if (view.frame != 1) continue;
       const std::string name = "images/" + std::to_string(view.camera) + ".png";
       fs::copy_file(view.image, folder / name, fs::copy_options::overwrite_existing);
-      const Camera& camera = made.cameras[static_cast<std::size_t>(view.camera)];
+      const Camera camera = moved_camera(made.cameras[static_cast<std::size_t>(view.camera)], away);
       std::string rows;
       const Matrix4<double> pose = matrix_from_rigid(inverse(camera.camera_from_world));
       for (Index i = 0; i < 4; ++i) {
@@ -283,6 +285,27 @@ TEST_CASE("photographs whose cameras another program found are views of one fram
   CHECK(fitted(settings).held.views == 1);
 
   CHECK(read_view_set(views_json(R"(, "longest_side": 48)")).cameras.front().width == 48);
+
+  // In another world, which alignment.json takes to the motion's.
+  const Matrix3<double> turn = so3_exp(Vector3<double>(0.4, -1, 2));
+  const Similarity away{2.5, turn, {1, 2, 3}};
+  write("", away);
+  const Vector3<double> back = turn.transpose() * away.translation * (-1 / away.scale);
+  std::string rows;
+  for (Index i = 0; i < 3; ++i) {
+    rows += "[";
+    for (Index j = 0; j < 3; ++j) rows += number_text(turn(j, i) / away.scale) + ", ";
+    rows += number_text(back[i]) + "], ";
+  }
+  write_text_file(folder / "alignment.json", R"({"matrix": [)" + rows + "[0, 0, 0, 1]]}");
+  const ViewSet aligned = read_view_set(views_json(R"(, "frame": 1, "alignment": "alignment.json")"));
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Matrix4<double> found = matrix_from_rigid(aligned.cameras[i].camera_from_world),
+                          wanted = matrix_from_rigid(set.cameras[i].camera_from_world);
+    // The same directions, from places that are as far from the origin.
+    CHECK((found.topLeftCorner<3, 3>() - wanted.topLeftCorner<3, 3>()).norm() < 1e-9);
+    CHECK((camera_center_world(aligned.cameras[i]) - camera_center_world(set.cameras[i])).norm() < 1e-9);
+  }
   write(R"(, "k1": 0.3)");  // straightened: its corners are of no pixel
   const ViewSet bent = read_view_set(views_json(R"(, "frame": 1)"));
   const ViewImage straight = view_image(bent, bent.views[0], {0, 0, 1});
@@ -308,6 +331,8 @@ TEST_CASE("settings of photographs are refused where there are none") {
   CHECK_THROWS_WITH(read_view_set(with(some + R"(, "longest_side": 48)")),
                     Catch::Contains("/longest_side: is of photographs; there is no /photos"));
   CHECK_THROWS_WITH(read_view_set(with(some + R"(, "frame": 1)")), Catch::Contains("/frame: is of photographs"));
+  CHECK_THROWS_WITH(read_view_set(with(some + R"(, "alignment": "cameras.json")")),
+                    Catch::Contains("/alignment: is of photographs"));
   CHECK_THROWS_WITH(read_view_set(with(R"("cameras": "cameras.json")")), Catch::Contains("there is no view"));
 }
 
