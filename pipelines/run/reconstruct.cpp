@@ -443,9 +443,7 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     std::vector<SceneState> states = result();
     const StageTotals totals = run_over_sequence(later_stage() + l, states);
-    give_bias(states);
-    lay_hidden(states);
-    take_bias(states);
+    lay_hidden_without_bias(states);
     progress_.later.push_back({std::move(states), totals});
     progress_.seconds += seconds_since(begin);
   }
@@ -501,6 +499,24 @@ class Reconstruction {
   void take_bias(std::vector<SceneState>& states) const {
     for (std::size_t t = 1; progress_.bias && t < states.size(); ++t)
       hsi4d::remove_depth_bias(clip_, *progress_.bias, states[t]);
+  }
+
+  /// Of states from which the bias was taken: to their last bits nothing but what is laid changes.
+  void lay_hidden_without_bias(std::vector<SceneState>& states) const {
+    if (!hidden_.is_on()) return;
+    std::vector<SceneState> before = states;
+    give_bias(before);
+    std::vector<SceneState> laid = before;
+    lay_hidden(laid);
+    std::vector<SceneState> result = laid;
+    take_bias(result);
+    for (std::size_t t = 1; t < states.size(); ++t) {
+      for (std::size_t o = 0; o < states[t].objects.size(); ++o) {
+        const ObjectPose &was = before[t].objects[o], &is = laid[t].objects[o];
+        if (was.translation != is.translation || was.rotation != is.rotation)
+          states[t].objects[o] = result[t].objects[o];
+      }
+    }
   }
 
   /// @param states  of all frames, as images pull them
