@@ -70,6 +70,17 @@ std::vector<const SceneState*> pointers(const std::vector<SceneState>& states) {
   return all;
 }
 
+/// Runs that were stopped after so many iterations and go on have the bits of `run`.
+void check_stopped_after(const RunConfig& config, const std::vector<int>& iterations) {
+  for (const int last : iterations) {
+    int count = 0;
+    const std::string run = "stopped" + std::to_string(last);
+    CHECK_THROWS_AS(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
+    execute_tiny(config, run, 2, true);
+    CHECK(differences("run", run) == kNone);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("what a joint carries keeps its distances from the joints that hang on it") {
@@ -329,13 +340,7 @@ TEST_CASE("a run keeps what is hidden with its carrier, and has the same bits af
   CAPTURE(of_hidden, way);
   CHECK(of_hidden < way / 2);
   constexpr int kEach = kPerFrame + 20;
-  for (const int last : {14 * kEach + 12, 21 * kEach + 3}) {
-    int count = 0;
-    const std::string run = "stopped" + std::to_string(last);
-    CHECK_THROWS_AS(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
-    execute_tiny(config, run, 2, true);
-    CHECK(differences("run", run) == kNone);
-  }
+  check_stopped_after(config, {14 * kEach + 12, 21 * kEach + 3});
 }
 
 TEST_CASE("a run finds on the table what was put down behind a screen, with the same bits after an interruption",
@@ -376,13 +381,7 @@ TEST_CASE("a run finds on the table what was put down behind a screen, with the 
   CHECK_THAT(log, Contains("more of vase would show than does; it stays with the "));
   CHECK(log.find("more of vase") != log.rfind("more of vase"));  // after the last frame, and after the refinement
   constexpr int kEach = kPerFrame + 20;
-  for (const int last : {29 * kEach + 12, 30 * kEach + 10}) {  // in the last frame but one, and in the refinement
-    int count = 0;
-    const std::string run = "stopped" + std::to_string(last);
-    CHECK_THROWS_AS(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
-    execute_tiny(config, run, 2, true);
-    CHECK(differences("run", run) == kNone);
-  }
+  check_stopped_after(config, {29 * kEach + 12, 30 * kEach + 10});  // in the last frame but one, and in the refinement
 }
 
 TEST_CASE("where masks are missing, what is drawn tells that an object is not hidden", "[run]") {
