@@ -90,11 +90,11 @@ void lay_carried(const Clip& clip, const Carried& before, const Carried& after, 
   };
   const auto low = static_cast<double>(std::min(before.last, after.last)),
              high = static_cast<double>(std::max(before.last, after.last));
+  const bool overlap = before.last > after.last;  // both carry it there
   std::vector<ObjectPose> poses;
   for (std::size_t t = before.from + 1; t < after.from; ++t) {
     const double share = high > low ? std::clamp((static_cast<double>(t) - low) / (high - low), 0.0, 1.0)
                                     : (static_cast<double>(t) > low ? 1.0 : 0.0);
-    const bool overlap = before.last > after.last;
     poses.push_back(pose_of(between(pose_in(before, overlap ? t : std::min(t, before.last)),
                                     pose_in(after, overlap ? t : std::max(t, after.last)), share)));
   }
